@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 
@@ -14,3 +15,11 @@ def data_folder(name: str) -> Path:
     if not folder.exists():
         pytest.skip(f"real data not found: {folder} (set ENDOTSR_DATA)")
     return folder
+
+
+def recorded_masks(clip: str, folder: str) -> list[np.ndarray]:
+    """The masks of a folder of an EndoNeRF clip, (H, W) each, True = tissue, or a skip."""
+    from endotsr.clips.opencv.png import read_png
+
+    masks = [read_png(file) for file in sorted((data_folder(clip) / folder).iterdir())]
+    return [(mask if mask.ndim == 2 else mask[..., 0]) < 128 for mask in masks]

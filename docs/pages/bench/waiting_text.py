@@ -32,7 +32,7 @@ def today(row: dict[str, Any]) -> str:
     """What the first line would say with the constants of today, where it assumed the speed of a known processor.
 
     "-" also for a row whose evaluation made several passes over the held-out frames, which took longer. A row without
-    `blas_threads` is of a slower evaluation, which counts as it was timed, and of an initial motion on one thread.
+    `blas_threads` is of a former evaluation, which counts as it was timed, and of an initial motion on one thread.
     """
     start, register = row["said"]["start"], row["register_bytes"]
     if start["speed"] != "assumed" or not register or row.get("passes", PASSES) > 1:
@@ -90,8 +90,8 @@ def about(rows: list[dict[str, Any]]) -> str:
     several = any(row.get("passes", PASSES) > 1 for row in rows)
     note = " It is of rows whose evaluation made one pass over the held-out frames; the others made three." * several
     former = (
-        " A *former* evaluation took longer than today's, and so did the initial motion before it; in these rows"
-        " *today* counts both as they were."
+        " A *former* evaluation is of a command before the evaluation and the initial motion were changed; in these"
+        " rows *today* counts the evaluation as it was timed, and the motion as on one thread."
     ) * any("blas_threads" not in row for row in rows)
     return (
         f"Frames of {' and '.join(sizes)}, every eighth held out; {' and '.join(clocks)}; {', '.join(machines)}; "

@@ -1,7 +1,8 @@
 """`endotsr evaluate`: held-out metrics of a run, or of any pictures, with baselines; comparison of methods."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from endotsr.cli.parts.comparison import EvaluateOptions, compare_methods, shown_sequence
 from endotsr.cli.parts.evaluating import evaluating
@@ -116,7 +117,7 @@ def evaluate_run(
     refuse_read_only(folder.path)
     weights, source = load_lpips_weights(lpips), source or run_source(folder)[0]
     with evaluating(folder, wait=wait):
-        before = _optional(folder)
+        before = _earlier(folder)
         model = load_model(folder)
         scene = MovingScene(folder.sequence_record(), model, folder)
         write_run_page(folder.path, scene, sequence if view else None)
@@ -127,19 +128,23 @@ def evaluate_run(
     print(held_out_table(metrics))
     for line in measure_lines(metrics.get("measures", {})):
         print(line)
-    if gone := sorted(before - _optional(folder)):
+    if gone := sorted(before - _optional(metrics)):
         print(f"of the earlier evaluation, metrics.json does not contain any more: {', '.join(gone)}")
     print(f"report: {folder.path / 'report.html'}", flush=True)
     return metrics
 
 
-def _optional(folder: RunFolder) -> set[str]:
-    """What the metrics.json of a run contains by an option: LPIPS and measures. Empty without a readable file."""
+def _earlier(folder: RunFolder) -> set[str]:
+    """`_optional` of the metrics.json in the folder of a run; empty without a readable file."""
     try:
-        found = read_json(folder.path / "metrics.json", ("held_out.mean",))
+        return _optional(read_json(folder.path / "metrics.json", ("held_out.mean",)))
     except InputError:
         return set()
-    mean, measures = found["held_out"]["mean"], found.get("measures")
+
+
+def _optional(metrics: Mapping[str, Any]) -> set[str]:
+    """What metrics of a run contain by an option: LPIPS and measures."""
+    mean, measures = metrics["held_out"]["mean"], metrics.get("measures")
     perceived = isinstance(mean, dict) and mean.get("lpips") is not None
     names = {f"{name} (--measures {name})" for name in measures} if isinstance(measures, dict) else set()
     return names | ({"LPIPS (--lpips FILE)"} if perceived else set())

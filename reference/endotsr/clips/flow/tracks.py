@@ -66,7 +66,8 @@ def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray) ->
     for place in range(last + 1):
         begins = start == place
         out.position[place][:, begins], out.followed[place, begins] = position[:, begins], True
-    flows, stopped = _PairFlows(sequence, train), threading.Event()
+    kept: Kept[int, Flows] = Kept(KEPT_BYTES)
+    stopped = threading.Event()
 
     def along(way: int) -> None:
         """Take the points to the later frames (way 1) or to the earlier ones (-1). No point has a frame in both."""
@@ -74,7 +75,8 @@ def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray) ->
             for place in range(last) if way > 0 else range(last, 0, -1):
                 if stopped.is_set():
                     return
-                there_and_back = flows.at(min(place, place + way))
+                pair = min(place, place + way)
+                there_and_back = kept.get(pair, partial(flows_between, sequence, train[pair], train[pair + 1]))
                 flow = there_and_back if way > 0 else Flows(there_and_back.backward, there_and_back.forward)
                 known = start <= place if way > 0 else start >= place
                 here = _Points(out.position[place][:, known], out.followed[place, known])
@@ -89,25 +91,6 @@ def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray) ->
     finally:
         stopped.set()  # an interruption may come while this thread waits
     return out
-
-
-class _PairFlows:
-    """The flows between neighbouring training frames, computed at first use, from any thread."""
-
-    def __init__(self, sequence: Sequence, train: list[int]) -> None:
-        self._sequence, self._train = sequence, train
-        self._kept: Kept[int, Flows] = Kept(KEPT_BYTES)
-        self._lock = threading.Lock()
-
-    def at(self, place: int) -> Flows:
-        """The flows between the training frames `place` and `place` + 1. Two threads may compute them, with equal
-        bits."""
-        with self._lock:
-            if place in self._kept:
-                return self._kept[place]
-        found = flows_between(self._sequence, self._train[place], self._train[place + 1])
-        with self._lock:
-            return self._kept.get(place, lambda: found)
 
 
 def _step(sequence: Sequence, frames: tuple[int, int], here: _Points, flows: Flows) -> _Points:

@@ -2,6 +2,7 @@
 
 import ctypes
 import sys
+import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
@@ -61,15 +62,16 @@ def bytes_of(value: object) -> int:
 
 
 class Kept(Generic[Key, Value]):
-    """A cache of computed values by key. Beyond `limit` bytes, the oldest values are dropped.
+    """A cache of computed values by key, for several threads. Beyond `limit` bytes, the oldest values are dropped.
 
-    A dropped value is recomputed on request. A value must therefore be a function of its key; the limit changes no
-    result.
+    A dropped value is recomputed on request, and two threads may compute the same one at the same time. A value must
+    therefore be a function of its key, to the bit; neither the limit nor the threads change a result.
     """
 
     def __init__(self, limit: float = np.inf) -> None:
         self.limit, self.bytes = limit, 0
         self._values: dict[Key, Value] = {}
+        self._lock = threading.Lock()
 
     def __len__(self) -> int:
         return len(self._values)
@@ -82,13 +84,22 @@ class Kept(Generic[Key, Value]):
 
     def put(self, key: Key, value: Value) -> None:
         """Store a value. The newest value is kept even if it exceeds the limit."""
+        with self._lock:
+            self._put(key, value)
+
+    def get(self, key: Key, make: Callable[[], Value]) -> Value:
+        """The value of a key, computed at first use, without the lock."""
+        with self._lock:
+            if key in self._values:
+                return self._values[key]
+        made = make()
+        with self._lock:
+            if key not in self._values:
+                self._put(key, made)
+            return self._values[key]
+
+    def _put(self, key: Key, value: Value) -> None:
         self._values[key] = value
         self.bytes += bytes_of(value)
         while self.bytes > self.limit and len(self._values) > 1:
             self.bytes -= bytes_of(self._values.pop(next(iter(self._values))))
-
-    def get(self, key: Key, make: Callable[[], Value]) -> Value:
-        """The value of a key, computed at first use."""
-        if key not in self._values:
-            self.put(key, make())
-        return self._values[key]

@@ -25,7 +25,7 @@ from endotsr.port.search.places import Spot, Statement, definition_modules, exec
 from endotsr.port.search.requests import OtherReading, exchanges, other_requests
 from endotsr.port.search.rewrites import rewrites, rounded, with_number
 from endotsr.port.search.second import SecondChange, at, beside, expressions, orders, pairs, parts, turned
-from endotsr.port.search.trial import LATEST, TELLING, Live, Trial
+from endotsr.port.search.trial import LATEST, TELLING, Live, Trial, installed
 from endotsr.port.stages.stage import Outputs, Stage
 
 SECONDS = 16.0  # computing time of a search; `find` gives a trajectory more
@@ -244,12 +244,8 @@ def _try(trial: Trial, one: Live, texts: Iterator[tuple[str, int]], rank: int) -
 @contextlib.contextmanager
 def _standing(spot: Spot, text: str) -> Iterator[None]:
     """The definition with another text at a spot, for a search beside this change."""
-    with written(spot, text):
-        back = spot.place.compiled()()
-        try:
-            yield
-        finally:
-            back()
+    with written(spot, text), installed(spot.place.compiled()):
+        yield
 
 
 def _replaced(spot: Spot, mode: str, new: str, words: str = "") -> str:

@@ -6,7 +6,7 @@ number of entries of the outputs that still differ: decisions do not change cont
 
 import ast
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ from endotsr.port.search.images import OF_IMAGES
 from endotsr.port.search.places import Spot, Statement, spots, written
 from endotsr.port.search.requests import OtherReading, other_requests
 from endotsr.port.search.screen import OF_THE_SCREEN
-from endotsr.port.search.trial import Install, Trial
+from endotsr.port.search.trial import Trial, installed
 from endotsr.port.stages.stage import Outputs
 
 SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
@@ -48,18 +48,8 @@ def try_conventions(trial: Trial, places: Sequence[Statement]) -> None:
         with contextlib.suppress(Exception):  # a changed text may raise anything
             whole, mode = trial.best(change.install, "reverse" if reverse else "both")
             alone = ", in the forward pass alone" if mode == "forward" and not reverse else ""
-            stands = None if alone else partial(_standing, change.install)
+            stands = None if alone else partial(installed, change.install)
             trial.note(whole, change.said + alone, change.spot, 1, 0, standing=stands)
-
-
-@contextlib.contextmanager
-def _standing(install: Install) -> Iterator[None]:
-    """The definition with a convention, for a search beside it."""
-    back = install()
-    try:
-        yield
-    finally:
-        back()
 
 
 class Interval(NamedTuple):

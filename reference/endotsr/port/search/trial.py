@@ -117,7 +117,7 @@ class Trial:
             inputs, settings = request.ask(one.inputs, one.settings) if request else (one.inputs, one.settings)
             found, saved = one.right, one.saved
             if mode != "reverse":
-                with _installed(install):
+                with installed(install):
                     found, saved = one.forward(self.stage, inputs, settings)
             same = one.same(request.tell(found) if request else found, one.forward_names)
             if not same and one.refused:
@@ -128,13 +128,13 @@ class Trial:
             explained += same and bool(one.refused)
             self.matched |= same and bool(one.refused.intersection(one.forward_names))
             if same and one.gradient_names and False not in gradients and (one.refused or not gradients):
-                with _installed(install if mode != "forward" else None):
+                with installed(install if mode != "forward" else None):
                     back = one.reverse(self.stage, inputs, saved)
                 same = one.same(request.tell(back) if request else back, one.gradient_names)
                 if not same and one.refused:
                     if mode == "reverse" or not self.forward_refused:
                         return ""
-                    with _installed(install):
+                    with installed(install):
                         gradients.append(one.is_derivative(self.stage))
             spoils = spoils or (not same and not one.refused)
         if self.unlike:
@@ -161,9 +161,9 @@ class Trial:
         inputs, settings = request.ask(one.inputs, one.settings) if request else (one.inputs, one.settings)
         found, saved = one.right, one.saved
         if mode != "reverse":
-            with _installed(install):
+            with installed(install):
                 found, saved = one.forward(self.stage, inputs, settings)
-        with _installed(install if mode != "forward" else None):
+        with installed(install if mode != "forward" else None):
             return {**found, **one.reverse(self.stage, inputs, saved)}
 
     def number(self, at: Callable[[float], Outputs], rest: float) -> tuple[list[tuple[float, bool]], int]:
@@ -218,7 +218,8 @@ def lower_precision(one: Answered) -> str:
 
 
 @contextlib.contextmanager
-def _installed(install: Install | None) -> Iterator[None]:
+def installed(install: Install | None) -> Iterator[None]:
+    """The definition with a change in force; None changes nothing."""
     back = install() if install else None
     try:
         yield

@@ -25,6 +25,7 @@ from endotsr.results.views.cameras import pivot_depth_of
 from endotsr.results.views.panels import ERROR_SCALE
 from endotsr.results.views.trajectories import Trajectories, header, key_times, packed, trajectories
 from endotsr.training.fitting.model import raster_settings
+from endotsr.training.runs.files import PAGE_ENDINGS
 from endotsr.untrusted.writing import replace_file
 
 MOST_KEYS = 128
@@ -36,7 +37,7 @@ TEMPLATE, SCRIPT = "viewer.html", "viewer.js"
 
 def check_page(file: Path, keys: int) -> None:
     """Raises InputError for a wrong extension or an invalid number of key times."""
-    if file.suffix.lower() not in (".html", ".htm"):
+    if file.suffix.lower() not in PAGE_ENDINGS:
         raise InputError(f"{file}: not a page; allowed: a name that ends in .html")
     if not 2 <= keys <= MOST_KEYS:
         raise InputError(f"export: --keys {keys} is not allowed; allowed: an integer from 2 to {MOST_KEYS}")

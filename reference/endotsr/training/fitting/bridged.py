@@ -57,7 +57,7 @@ class BridgedTargets:
     sequence: Sequence
     config: Config
     stored: Kept[tuple[int, int], dict[BridgedTime, Stored]] = field(default_factory=Kept)  # by gap
-    lock: threading.Lock = field(default_factory=threading.Lock)  # of `stored` and `making`
+    lock: threading.Lock = field(default_factory=threading.Lock)  # of `making`
     making: Making = NOTHING_MADE
 
     def observed(self, at: BridgedTime) -> tuple[Targets, Camera]:
@@ -74,15 +74,16 @@ class BridgedTargets:
 
         waiting   whether the training waits for them
         """
-        gap, clock = (earlier, later), time.perf_counter if waiting else time.thread_time
-        with self.lock:
-            if gap in self.stored:
-                return self.stored[gap]
-        began = clock()
-        made = self._made(earlier, later)
-        with self.lock:
-            self._count(clock() - began, waiting)
-            return self.stored.get(gap, lambda: made)
+        clock = time.perf_counter if waiting else time.thread_time
+
+        def make() -> dict[BridgedTime, Stored]:
+            began = clock()
+            made = self._made(earlier, later)
+            with self.lock:
+                self._count(clock() - began, waiting)
+            return made
+
+        return self.stored.get((earlier, later), make)
 
     def _count(self, seconds: float, waiting: bool) -> None:
         """Add one gap to `making`."""

@@ -32,8 +32,14 @@ PAGES = {  # a file that makes its folder one of results, and the names of its p
     "windows.json": ("report.html", "view.html"),
     "tradeoff.json": ("tradeoff.html",),
 }
-PAGE = (".html", ".htm")
-ENDINGS = {"--json": (".json",), "--html": PAGE, "--csv": (".csv",), "--draw": PAGE, "--badge": (".svg",)}  # by option
+PAGE_ENDINGS = (".html", ".htm")
+ENDINGS = {
+    "--json": (".json",),
+    "--html": PAGE_ENDINGS,
+    "--csv": (".csv",),
+    "--draw": PAGE_ENDINGS,
+    "--badge": (".svg",),
+}  # by option
 OF_OTHERS = (".pdf", ".png", ".jpg", ".jpeg", ".webp", ".gif", ".mp4", ".npz", ".npy", ".ply", ".toml")
 KNOWN_ENDINGS = frozenset((*OF_OTHERS, *(ending for own in ENDINGS.values() for ending in own)))
 HEAD = 4096  # bytes; a zero byte there is the sign of a picture, a video or an array: text in UTF-8 has none

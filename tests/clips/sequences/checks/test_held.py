@@ -6,9 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from data_folder import data_folder
+from data_folder import recorded_masks
 from endonerf_writer import write_endonerf
-from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.held import FEWEST, HeldMasks
 from endotsr.clips.sequences.read import read_sequence
@@ -65,8 +64,7 @@ def test_simulated_masks_are_those_of_each_frame(scene):
 @pytest.mark.parametrize("clip", ["endonerf_pulling", "endonerf_cutting"])
 @pytest.mark.parametrize("folder", ["masks", "gt_masks"])
 def test_recorded_masks_are_those_of_each_frame(clip, folder):
-    masks = [read_png(file) for file in sorted((data_folder(clip) / folder).iterdir())]
-    masks = [(mask if mask.ndim == 2 else mask[..., 0]) < 128 for mask in masks]
+    masks = recorded_masks(clip, folder)
     for every in (1, 2, 3):
         assert not found(masks[::every])
     assert "once every 5 frames" in found(masks[i // 5 * 5] for i in range(len(masks)))[0].what

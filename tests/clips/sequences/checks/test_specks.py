@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from common_folder import FRAMES, HEIGHT, WIDTH, written
 
-from data_folder import data_folder
+from data_folder import data_folder, recorded_masks
 from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.specks import MANY, Specks, speck_count
@@ -101,8 +101,7 @@ def test_simulated_masks_are_no_noise(scene):
 @pytest.mark.parametrize("folder", ["masks", "gt_masks"])
 def test_recorded_masks_are_no_noise(clip, folder):
     """Also at half of their size, where holes of the depth become single pixels."""
-    masks = [read_png(file) for file in sorted((data_folder(clip) / folder).iterdir())]
-    masks = [(mask if mask.ndim == 2 else mask[..., 0]) < 128 for mask in masks]
+    masks = recorded_masks(clip, folder)
     assert max(speck_count(mask) / mask.size for mask in masks) < MANY / 30
     assert not found(*(mask[::2, ::2] for mask in masks))
 

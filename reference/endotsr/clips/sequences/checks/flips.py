@@ -139,6 +139,14 @@ def agreed_disparity(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArr
     return np.where(match.disagreement <= 1, match.raw, np.float32(np.nan))
 
 
+def pair_finding(
+    left: NDArray[np.uint8], right: NDArray[np.uint8], depth: Array, where: str, frame: int
+) -> list[Finding]:
+    """`stereo_finding` for the disparity of a pair (H, W, 3); none for narrow pictures."""
+    disparity = agreed_disparity(left, right)
+    return [] if disparity is None else stereo_finding(depth, disparity, where, frame)
+
+
 def stereo_finding(depth: Array, disparity: Array, where: str, frame: int) -> list[Finding]:
     """A finding if depth increases with the disparity (H, W) of the stereo pair, or fits it after a flip.
 

@@ -18,7 +18,7 @@ from endotsr.clips.sequences.checks.colour_planes import ColourPlanes
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_facts, light_correlation
 from endotsr.clips.sequences.checks.depth_pair import DepthPairs
 from endotsr.clips.sequences.checks.depth_steps import DepthSteps
-from endotsr.clips.sequences.checks.flips import DepthTurns, Fit, agreed_disparity, shading_fit, stereo_finding
+from endotsr.clips.sequences.checks.flips import DepthTurns, Fit, pair_finding, shading_fit
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts
 from endotsr.clips.sequences.checks.kinds import Finding, finding, tried
 from endotsr.clips.sequences.checks.late import LateParts
@@ -185,8 +185,8 @@ class FramePass:
         self.views.add(i, picture, right)
         if depth is None or clip.depth is None or right.shape != picture.shape:
             return
-        if i == 0 and (disparity := agreed_disparity(picture, right)) is not None:
-            self.findings += stereo_finding(depth, disparity, str(clip.depth.files[0]), 0)
+        if i == 0:
+            self.findings += pair_finding(picture, right, depth, str(clip.depth.files[0]), 0)
         if i in self.against.sampled and (tissue is not None or not clip.masks):
             with suppress(InputError):  # the check of the cameras reports it
                 self.against.add(i, frame_of(picture, tissue, depth), right)

@@ -10,6 +10,8 @@ with a, b the halves. The same with the rows of b in another place, moved by a t
 what unrelated detail attains.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.ndimage import uniform_filter
 
@@ -71,15 +73,19 @@ def _shifted_correlation(one: FloatArray, other: FloatArray, lit: FloatArray, ot
     """The largest correlation of two pictures over shifts of up to a sixth of the width, where both are lit."""
     if one.shape != lit.shape:
         lit, other_lit = np.ones(one.shape), np.ones(other.shape)
-    width = one.shape[1]
-    most = width // FARTHEST
     best = 0.0
-    for k in range(-most, most + 1):
-        here, there = slice(max(0, k), width + min(0, k)), slice(max(0, -k), width + min(0, -k))
+    for here, there in _shifts(one.shape[1]):
         both = (lit[:, here] > 0) & (other_lit[:, there] > 0)
         if both.mean() >= LEAST_LIT:
             best = max(best, correlation(one[:, here][both], other[:, there][both]))
     return best
+
+
+def _shifts(width: int) -> Iterator[tuple[slice, slice]]:
+    """The columns of two pictures that lie over one another, for every shift of up to a sixth of the width."""
+    most = width // FARTHEST
+    for k in range(-most, most + 1):
+        yield slice(max(0, k), width + min(0, k)), slice(max(0, -k), width + min(0, -k))
 
 
 def _fits(one: FloatArray, other: FloatArray, lit: FloatArray, other_lit: FloatArray) -> tuple[float, float]:
@@ -93,10 +99,8 @@ def _fits(one: FloatArray, other: FloatArray, lit: FloatArray, other_lit: FloatA
 
 def _fit(one: FloatArray, other: FloatArray, lit: FloatArray, other_lit: FloatArray) -> float:
     """The mean over the lit pixels of the largest local correlation along a row; 0 without any."""
-    width = one.shape[1]
-    most, best = width // FARTHEST, np.full(one.shape, -np.inf)
-    for k in range(-most, most + 1):
-        here, there = slice(max(0, k), width + min(0, k)), slice(max(0, -k), width + min(0, -k))
+    best = np.full(one.shape, -np.inf)
+    for here, there in _shifts(one.shape[1]):
         found = _local_correlation(one[:, here], other[:, there], lit[:, here] * other_lit[:, there])
         best[:, here] = np.maximum(best[:, here], found)
     known = best[np.isfinite(best)]

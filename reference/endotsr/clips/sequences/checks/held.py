@@ -1,7 +1,7 @@
 """Masks that are held for several frames: annotated at every fifth frame, say, and copied to the others.
 
-In: the masks in time order. Out: a finding. Masks that are drawn or computed for each frame change from frame to frame
-while an instrument moves, and at no regular distance where it hardly does.
+In: the masks in time order. Out: a finding. Masks of each frame are expected to change from frame to frame while an
+instrument moves, and at no regular distance where it hardly does, as those of the recorded clips.
 """
 
 from collections import Counter

@@ -8,13 +8,8 @@ import numpy as np
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.depth import light_correlation, light_finding
-from endotsr.clips.sequences.checks.flips import (
-    DepthTurns,
-    agreed_disparity,
-    shading_finding,
-    shading_fit,
-    stereo_finding,
-)
+from endotsr.clips.sequences.checks.flips import DepthTurns, pair_finding, shading_finding, shading_fit
+from endotsr.clips.sequences.checks.frame_pass import SAMPLED
 from endotsr.clips.sequences.checks.kinds import Finding
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.checks.specks import Specks
@@ -23,13 +18,10 @@ from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
 
-SAMPLED = 16  # frames whose masks and depth are compared with their pictures, as in `frame_pass`
-STEP = 4  # pixels between the sampled rows and columns
-
 
 def loaded_mask_findings(sequence: Sequence, where: str) -> list[Finding]:
     """Masks that are noise, in all frames, and masks that fit the pictures after a flip, in the sampled ones."""
-    specks, evidence = Specks(), MaskEvidence(STEP)
+    specks, evidence = Specks(), MaskEvidence()
     for i, mask in enumerate(sequence.masks):
         specks.add(i, mask)
     for i in even_frames(sequence.count, SAMPLED):
@@ -61,6 +53,4 @@ def first_pair_findings(sequence: Sequence, clip: Clip, frames: range) -> list[F
     left = np.ascontiguousarray(sequence.picture(0))
     if right.shape != left.shape or not sequence.depth[0].any():
         return []
-    disparity = agreed_disparity(left, right)
-    file = str(clip.depth.files[frames[0]])
-    return [] if disparity is None else stereo_finding(sequence.depth[0], disparity, file, 0)
+    return pair_finding(left, right, sequence.depth[0], str(clip.depth.files[frames[0]]), 0)
