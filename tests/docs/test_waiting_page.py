@@ -6,12 +6,10 @@ from types import SimpleNamespace
 import pytest
 from pages.bench import waiting, waiting_text
 
-from endotsr.clips.sequences.forecast.seconds import TimedCommand, estimated_seconds, expected_frames
-from endotsr.config import PRESETS, with_iterations
-
 RECORD = waiting.PROGRAM.read()
 RISEN = {  # asked for: 0.1; the page shows these rises
     ("endonerf_cutting", "quick", "wall"): 0.13,  # with AVX2; 0.06 to 0.09 on two others
+    ("endonerf_cutting", "sharp", "wall"): 0.14,  # with AVX-512 on one machine; 0.03 and 0.07 on two others
     # before the parts of an iteration depended on the vectors, and the second thread slowed it by more than its share
     ("simulated_breathing", "sharp", "wall"): 0.15,
 }
@@ -46,21 +44,6 @@ def test_the_first_line_of_an_assumed_speed_holds_today_on_the_machine_it_was_me
     assert (shown == "-") == (row["said"]["start"]["speed"] == "measured" or not row["register_bytes"] or former)
     if shown != "-":
         assert abs(float(shown.partition("(")[2].rstrip("%)"))) <= 100 * MISSED.get((*machine_of(row), "today"), 0.15)
-
-
-def test_what_the_page_says_of_the_evaluation_of_sharp():
-    """With a single pass it was forecast too long, on pulling by three quarters; the constants are smaller today."""
-    rows = [row for row in RECORD["rows"] if row["preset"] == "sharp" and row.get("passes") == 1]
-    rows = [row for row in rows if "blas_threads" not in row]
-    assert len(rows) == 2
-    for row in rows:
-        took, told = row["whole"] - row["trained"], row["said"]["start"]
-        config = with_iterations(PRESETS["sharp"], row["iterations"])
-        plan = TimedCommand(config, expected_frames(row["frames"], config), 640 * 512)
-        assert told["evaluation"] > took
-        if row["clip"] == "endonerf_pulling":
-            assert 1.7 < told["evaluation"] / took < 1.8
-        assert estimated_seconds(plan).evaluation < told["evaluation"]
 
 
 def test_what_is_excluded_takes_no_time(monkeypatch):

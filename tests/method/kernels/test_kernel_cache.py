@@ -25,10 +25,10 @@ print(repr(deformation_forward(weight, centre, width, 0.9)[0][0, 0].item()))
 """
 
 
-def process(folder: Path, cache: Path) -> subprocess.CompletedProcess:
+def process(folder: Path, cache: Path, **variables: str) -> subprocess.CompletedProcess:
     """A process that finds the package in `folder` and is to keep its kernels in `cache`; prints 2^(-u^2 / ln 2)."""
     environment = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "NUMBA_DISABLE_JIT")}
-    environment |= {"PYTHONPATH": str(folder), "XDG_CACHE_HOME": str(cache)}
+    environment |= {"PYTHONPATH": str(folder), "XDG_CACHE_HOME": str(cache)} | variables
     return subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=True)
 
 
@@ -85,6 +85,14 @@ def test_a_cache_that_cannot_be_written_is_said_and_none_grows_beside_the_source
     assert line.startswith(f"endotsr: warning: {tmp_path / 'no_folder'}") and "recompiled at every start" in line
     assert "set NUMBA_CACHE_DIR" in line
     assert not list((tmp_path / "endotsr").rglob("*.nb?"))
+
+
+def test_kernels_that_numba_does_not_keep_are_compiled_and_used(tmp_path):
+    """Without optimisation; Numba warns with the name of the file."""
+    copy_package(tmp_path)
+    plain = process(tmp_path, tmp_path / "cache", NUMBA_OPT="0")
+    assert float(plain.stdout) == answer(tmp_path)
+    assert "Cannot cache compiled function" in plain.stderr
 
 
 def plus_one(x):

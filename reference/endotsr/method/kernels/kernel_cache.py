@@ -90,6 +90,7 @@ class _Locator(UserProvidedCacheLocator):
 
     def __init__(self, py_func: Callable, py_file: str) -> None:
         file = Path(py_file)
+        self._py_file = py_file  # Numba names it when it warns that a kernel cannot be kept
         self._code, self._lineno = py_func.__code__, py_func.__code__.co_firstlineno
         inside = file.parent.relative_to(_PACKAGE) if file.is_relative_to(_PACKAGE) else Path("others")
         self._cache_path = str(kernel_folder() / inside)
