@@ -96,7 +96,7 @@ plt.show()
 
 # %% [markdown]
 # The objective is a weighted sum of losses. L and the Matérn prior of S are terms of it; A and S change the render. Each
-# $\mathcal L$ and $\mathcal S$ is a number for one render and one frame, but for $\mathcal L_{\mathrm{msp}}$, which
+# $\mathcal L$ and $\mathcal S$ is a number for one render and one frame, except $\mathcal L_{\mathrm{msp}}$, which
 # depends on the coefficients of S alone. The other factors are weights, $i$ is the iteration, and a bracket
 # $[\,\cdot\,]$ is 1 if its condition holds and 0 otherwise. {doc}`14_full_sequence` has the table of these terms and
 # weights.

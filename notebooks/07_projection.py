@@ -341,7 +341,6 @@ plt.show()
 #
 # **(7.10) Into the world.** The point $(x,y,z)^\top=W\mu+\mathbf d$ gives $g_\mu=W^\top(g_x,g_y,g_z)^\top$.
 #
-#
 # $$
 # \begin{aligned}
 # g_x &= \frac{f_x}{z}g_u+[\,|x/z|\le L_x\,]\,g_{x'},\qquad g_y=\frac{f_y}{z}g_v+[\,|y/z|\le L_y\,]\,g_{y'},\\
@@ -363,6 +362,8 @@ plt.show()
 # g_W&=\sum_i\bigl[(g_x,g_y,g_z)_i^\top\mu_i^\top+J_i^\top g_{T,i}R_i^\top\bigr]-\mathbf d\,g_{\mathbf o}^\top,
 # \end{aligned}
 # $$
+#
+# where $i$ runs over the Gaussians.
 #
 # <!-- definition: endotsr.definition.projection.projection_reverse -->
 # ```python

@@ -58,7 +58,7 @@ rng = np.random.default_rng(9)
 # (\mathsf D G)[y,x] = \sum_{r=-2}^{2}\sum_{s=-2}^{2} b_r b_s\; G\bigl[\mathrm{refl}(2y+r,H),\ \mathrm{refl}(2x+s,W)\bigr],
 # $$
 #
-# At the border the image is reflected, without repeating the edge sample.
+# with the image reflected at its border, without repeating the edge sample.
 #
 # Up-sampling $\mathsf U$ is linear interpolation along each axis, by one of two rules. The preset `paper` uses `co_sited`:
 #

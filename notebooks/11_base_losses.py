@@ -109,7 +109,7 @@ H, W = M.shape
 # \end{aligned}
 # $$
 #
-# Here $\mu_e,\sigma_e^2$ and $\mu_h,\sigma_h^2$ are the mean and the variance of $e$ and of $h$ in the window. Without
+# where $\mu_e,\sigma_e^2$ and $\mu_h,\sigma_h^2$ are the mean and the variance of $e$ and of $h$ in the window. Without
 # tissue $\mathcal L_1$ is 0 and $\mathcal S$ is 1.
 #
 # <!-- definition: endotsr.definition.masked_l1.masked_l1_forward -->
@@ -209,7 +209,7 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 # \end{aligned}
 # $$
 #
-# Here $K$ is the number of channels (1 or 3).
+# with $K$ the number of channels (1 or 3).
 #
 # <!-- definition: endotsr.definition.depth.normalised_depth_forward -->
 # ```python
@@ -428,6 +428,8 @@ plt.show()
 # g_{\hat I_{cp}}&=g\,[\neg M_p]\,\frac{f}{3HW}\sum_{p'\sim p}\operatorname{sign}(\bar I_{cp}-\bar I_{cp'}),
 # \end{aligned}
 # $$
+#
+# where $p'\sim p$ are the neighbours of $p$, at most four, and $g=g_{\mathcal L_{\mathrm{smooth}}}$.
 #
 # <!-- definition: endotsr.definition.masked_l1.masked_l1_reverse -->
 # ```python

@@ -65,7 +65,7 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$, with halves rounded to the even number; a
 # position that occurs twice counts once. Each view is rendered by the base model, without A and S, with all harmonic
 # degrees and before a black background, and is not clamped. This chapter uses a blurred frame in place of the base
-# render. The results of true base renders differ from those below, as the tables of {doc}`/specification/rulings` show.
+# render. The results of true base renders differ from those below, as the table of {doc}`/specification/rulings` shows.
 #
 # **(12.1) Two gradients.** The objective contains
 # $\mathcal L_{\mathrm{rgb}}+\lambda_{\mathrm{lap}}\mathcal L_{\mathrm{lap}}$. Its gradient with respect to the render is the

@@ -104,18 +104,20 @@ def test_five_of_five_has_a_lower_limit_of_55_percent():
 
 def test_the_answer_follows_the_results():
     one = {"psnr": 30.0, "seconds": 10.0, "numbers": 11, "gaussians": 100}
-    half = one | {"psnr": 30.5, "seconds": 5.0}
-    pairs = lambda auto: [{"everything": one, "auto": auto}] * 3
+    half = one | {"psnr": 30.5, "seconds": 4.0}
+    pairs = lambda auto: [{"everything": one, "auto": auto, "inspect_s": 1.0}] * 3
     same = effects_parts.answer({"real": ["clip"], "scenes": {"still": pairs(half), "clip": pairs(one)}})
-    assert same.startswith("**On 2 clips `--effects auto` saves 25% of the time in the median, and 0% to 50% by clip.")
-    assert "saves 50% of the time" in same and "+0.50 ± 0.00 dB" in same and "`clip`, there is nothing to save" in same
+    assert same.startswith("**On 2 clips `--effects auto`, inspection included, saves 20% of the time in the median, ")
+    assert "and -10% to 50% by clip." in same and "saves 50% of the time" in same and "+0.50 ± 0.00 dB" in same
+    assert "`clip`, there is nothing to save with `demo`, and the inspection costs 10% of the time." in same
     other = effects_parts.answer({"real": ["clip"], "scenes": {"still": pairs(half), "clip": pairs(half)}})
     assert "nothing to save" not in other and "it saves 50% of the time (+0.50 dB)" in other
 
 
 def test_the_answer_says_why_the_plan_for_paper_saves_more():
     one = {"psnr": 30.0, "seconds": 10.0, "numbers": 11, "gaussians": 100}
-    result = {"real": ["clip"], "scenes": dict.fromkeys(("still", "clip"), [{"everything": one, "auto": one}] * 3)}
+    pair = {"everything": one, "auto": one, "inspect_s": 0.0}
+    result = {"real": ["clip"], "scenes": dict.fromkeys(("still", "clip"), [pair] * 3)}
     plan = {"changes": [{"key": "model.spectral_motion"}], "time_saved": 0.04, "memory_saved": 0.072}
     bench = {"parts": {"spectral_motion": {"saved": 0.0246, "memory_saved": 0.072}}}
     said = effects_parts.answer(result, {"clips": {"clip": {"plan": plan}}}, bench)

@@ -32,7 +32,7 @@ KINDS = {
     "highlight": "highlights, here or in a neighbouring frame",
     "mask": f"within {NEAR} px of an excluded pixel",
     "border": f"within {NEAR} px of the border of the picture",
-    "steep": "the steepest tenth of the rest",
+    "steep": "the steepest tenth of the tissue",
     "plain": "all other pixels",
 }
 
@@ -113,8 +113,9 @@ def tables(result: dict[str, Any]) -> str:
     other = ["Tissue pixels", "of the pixels", "of the model's error", "of the error of flow", "model minus flow"]
     return (
         markdown(head, by_frame) + "\n\n" + markdown(other, by_kind) + "\n\n"
-        "PSNR over the tissue. *Model minus flow* is the difference of the squared errors as a fraction of the whole "
-        "squared error of flow. On the pixels that no neighbour excludes, the squared error of the model is "
+        "One run; PSNR over the tissue. A pixel belongs to the first kind that applies. *Model minus flow* is the "
+        "difference of the squared errors as a fraction of the whole squared error of flow. On the pixels that no "
+        "neighbour excludes, the squared error of the model is "
         f"{100 * abs(ratio):.1f} % {'below' if ratio < 0 else 'above'} that of flow. {result['sequence']}, "
         f"{result['date'][:10]}."
     )

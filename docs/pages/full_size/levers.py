@@ -133,9 +133,10 @@ def motion_table(result: dict[str, Any]) -> str:
     head = ["Scene and paths", "the tissue moves, mm", *(label for _, label, _ in MOTION)]
     least = min(path["followed"] for path in paths.values())
     note = (
-        f"Mean ± 95 % interval; {about(result)} *Flow from frame to frame* is the tracked motion (B15) with which "
-        f"{SHARP} starts, before any training; flow follows {100 * least:.0f} % of its points or more, and the others "
-        f"move with their neighbours; {where(result['chain'])}."
+        f"Mean ± 95 % interval; {about(result)} *Flow from frame to frame* are tracks as in (B15), to which {SHARP} "
+        "fits its initial motion, before any training, from every tissue pixel with a prior depth. Flow follows a "
+        f"point in {100 * least:.0f} % of the frames or more, in the mean of a scene; elsewhere the point moves with "
+        f"its neighbours; {where(result['chain'])}."
     )
     return noted(head, rows, note)
 
@@ -162,8 +163,9 @@ def table(result: dict[str, Any]) -> str:
 
 
 def about(result: dict[str, Any]) -> str:
-    """Length and place of the trainings."""
-    return f"{result['seeds']} seeds, {result['iterations']} iterations; {where(result)}."
+    """Length, start and place of the trainings."""
+    start = f"{result['iterations']} iterations from the initial points of `demo`"
+    return f"{result['seeds']} seeds, {start}; {where(result)}."
 
 
 def cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, digits: int) -> str:

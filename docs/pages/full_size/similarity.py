@@ -32,7 +32,11 @@ def table(result: dict[str, Any]) -> str:
         [label, *(cell(scene[label], scene[FORMER], key, digits) for _, scene, key, digits in columns)]
         for label in WEIGHTS
     ]
-    note = f"The first row is a level, the others are differences; {about(result)}"
+    threshold = THRESHOLD["density"]["gradient_threshold"]
+    note = (
+        "The first row is a level, the others are differences; the clip is read at half size, and "
+        f"`gradient_threshold` is {threshold:.4f}; {about(result)}"
+    )
     return noted(["$w$", *(column[0] for column in columns)], rows, note)
 
 

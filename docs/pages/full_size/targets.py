@@ -78,7 +78,8 @@ def table(result: dict[str, Any]) -> str:
     ]
     head = ["Held out", *(f"{label}, dB" for label in KINDS.values()), "tissue with a target"]
     about = (
-        f"PSNR over the tissue with a target; {result['sequence']}, scale {result['scale']:g}, {result['date'][:10]}."
+        "PSNR of the mean squared error over the tissue with a target of all held-out frames together, not the mean "
+        f"over frames; {result['sequence']}, scale {result['scale']:g}, {result['date'][:10]}."
     )
     return noted(head, rows, about)
 

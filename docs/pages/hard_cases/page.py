@@ -2,7 +2,8 @@
 
     python docs/make.py hard_cases measure     in a few seconds
 
-Every naive formula is executed, on the same rounded inputs as ours; the truth is exact or has 60 digits (mpmath).
+Every naive formula is executed, on the same rounded inputs as ours; the truth is exact or has 60 digits (mpmath), or
+extended precision (X1).
 """
 
 # A record of a page is complete, or the KeyError says what it lacks.

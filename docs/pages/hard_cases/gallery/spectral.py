@@ -65,7 +65,7 @@ def phase(dtype):
 )
 def matern(dtype):
     omega = frequencies(8, 1, 16, dtype)
-    density = (dtype(5) / dtype(1e-60) ** 2 + omega**2) ** 3
+    density = (dtype(5) / dtype(1e-60) ** 2 + (dtype(2 * np.pi) * omega) ** 2) ** 3
     return 1.0, (density / density.mean())[0], matern_weights(omega, 1e-60)[0]
 
 
