@@ -27,7 +27,7 @@ def scaled(sequence, spread: float, seed: int = 0):
 
 
 def codes(sequence) -> list[str]:
-    return [found.code for found in scale_finding(loaded_steps(sequence), "depth")]
+    return [found.code for found in loaded_steps(sequence).findings("depth")]
 
 
 @pytest.mark.parametrize("name", ["still", "breathing", "pulling", "cutting", "smoke", "moving-camera", "everything"])
@@ -43,11 +43,45 @@ def test_a_hand_held_scope_that_comes_near_has_one_scale():
     assert codes(simulate(with_settings(settings, camera_motion=path)).sequence) == []
 
 
+@pytest.mark.parametrize("stride", [1, 2, 4])
+def test_a_scope_that_comes_much_nearer_between_two_pictures_has_one_scale(stride):
+    """Its flow is wrong at this size: a single step is unexplained by more than the limit."""
+    settings = with_effects(SimulatorSettings(**{**SIZE, "frames": 48}), "camera_motion", "noise")
+    path = {"path": "hand", "amplitude": 25.0, "cycles": 4.0}
+    sequence = simulate(with_settings(settings, camera_motion=path)).sequence
+    steps = DepthSteps(48 // stride)
+    for k, i in enumerate(range(0, 48, stride)):
+        steps.add(k, sequence.picture(i), sequence.depth[i], sequence.masks[i])
+    assert steps.findings("depth") == [] and (stride < 4 or steps.jumps)
+
+
 def test_one_frame_of_another_scale_is_no_scale_of_every_frame():
     sequence = simulate(SimulatorSettings(**SIZE)).sequence
     depth = sequence.depth.copy()
     depth[7] *= 1.3
-    assert codes(replace(sequence, depth=depth)) == []
+    there, back = loaded_steps(replace(sequence, depth=depth)).findings("depth")
+    assert there.code == back.code == "depth-scale-jump" and (there.frame, back.frame) == (7, 8)
+    assert "from frame 6 to 7 the depth becomes 1.30 times as large" in there.what and "0.78 times" in back.what
+
+
+@pytest.mark.parametrize("name", ["breathing", "pulling", "moving-camera"])
+@pytest.mark.parametrize("factor, found", [(1.2, ["depth-scale-jump"]), (0.8, ["depth-scale-jump"]), (1.08, [])])
+def test_depth_in_parts_is_named_at_their_border(name, factor, found):
+    """As of a network that computes the depth of a clip in parts."""
+    sequence = simulate(msgspec.structs.replace(named_scene(name), **SIZE)).sequence
+    depth = sequence.depth.copy()
+    depth[9:] *= factor
+    assert codes(replace(sequence, depth=depth)) == found
+
+
+def test_a_jump_between_the_sampled_steps_is_found():
+    """Of 300 steps 48 are sampled; the depth of every one is compared."""
+    picture, depth = np.zeros((16, 16, 3), np.uint8), np.full((16, 16), 50.0, np.float32)
+    for border in (100, 101, 102):
+        steps = DepthSteps(300)
+        for i in range(300):
+            steps.add(i, picture, depth * (1.25 if i >= border else 1.0), None)
+        assert [found.frame for found in steps.findings("depth")] == [border]
 
 
 def test_the_picture_has_to_grow_as_the_depth_falls():
@@ -101,3 +135,6 @@ def test_recorded_depth_has_one_scale(name):
     sequence = read_sequence(data_folder(name), SequenceConfig(frames="0:60", scale=0.5))
     assert codes(sequence) == []
     assert codes(scaled(sequence, 0.05)) == ["depth-own-scale"]
+    depth = sequence.depth.copy()
+    depth[31:] *= 1.2
+    assert codes(replace(sequence, depth=depth)) == ["depth-scale-jump"]

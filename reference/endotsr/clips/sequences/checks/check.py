@@ -15,7 +15,6 @@ from endotsr.clips.sequences.checks.agreement import agreement_findings, agreeme
 from endotsr.clips.sequences.checks.cameras import baseline_findings, camera_findings
 from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.depth import depth_findings, light_finding, usual_depth
-from endotsr.clips.sequences.checks.depth_steps import scale_finding
 from endotsr.clips.sequences.checks.flips import shading_finding
 from endotsr.clips.sequences.checks.frame_pass import FramePass
 from endotsr.clips.sequences.checks.frames import (
@@ -119,7 +118,7 @@ def _of_depth(run: FramePass, config: Config) -> list[Finding]:
     where = str(depth.files[0].parent)
     return [
         *depth_findings(run.depth, where, run.clip.arbitrary, config.raster.near, depth.assumed),
-        *scale_finding(run.steps.found, where),
+        *run.steps.findings(where),
         *light_finding(run.light, where),
         *shading_finding(run.shading, where),
         *run.turns.findings(where),

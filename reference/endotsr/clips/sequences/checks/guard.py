@@ -14,7 +14,7 @@ from endotsr.clips.sequences.checks.cameras import camera_findings
 from endotsr.clips.sequences.checks.colour_planes import loaded_plane_findings
 from endotsr.clips.sequences.checks.dark_border import loaded_border_findings
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_findings, usual_depth
-from endotsr.clips.sequences.checks.depth_steps import loaded_steps, scale_finding
+from endotsr.clips.sequences.checks.depth_steps import loaded_steps
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.clips.sequences.checks.kinds import Finding, worst_first
 from endotsr.clips.sequences.checks.late import loaded_late_findings
@@ -54,7 +54,7 @@ def guarded(
     found += loaded_split_findings(sequence, folder)
     priors = str(clip.depth.files[0].parent)
     found += depth_findings(depth, priors, clip.arbitrary, near, clip.depth.assumed)
-    found += scale_finding(loaded_steps(sequence), priors)
+    found += loaded_steps(sequence).findings(priors)
     found += loaded_depth_findings(sequence, priors) + first_pair_findings(sequence, clip, frames)
     found += camera_findings(sequence.cameras, usual_depth(depth), folder, clip.crop)
     if (

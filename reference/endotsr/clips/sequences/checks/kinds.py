@@ -203,6 +203,10 @@ KINDS: dict[str, Kind] = {
                             " be normalised on its own",
                             "store lengths with one scale for all frames; relative depth of a network: endotsr depth"
                             " --given FOLDER --kind relative --align frame"),
+    "depth-scale-jump": Kind("warning", "the tissue jumps to another distance there: the depth may come in parts, each"
+                             " with a scale of its own, or one frame may have another scale",
+                             "store lengths with one scale for all frames; relative depth of a network: endotsr depth"
+                             f" --given FOLDER --kind relative --align frame; for one frame: {LEAVE_OUT}"),
     "constant-depth": Kind("refusal", "the scene would be a flat board", "supply measured depth"),
     "normalised-depth": Kind("warning", "each frame looks stretched to the full range, so its values are not"
                              " lengths", "store lengths with one scale for all frames"),
