@@ -17,7 +17,7 @@ import numpy as np
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.studies.windows.scene import WindowedScene
 
-NEAREST = 128  # Gaussians averaged; the error of a single one is as large as the motion (B18)
+NEAREST = 128  # Gaussians averaged; the motion of a single one is undetermined (B18)
 
 
 def seam(scene: WindowedScene, k: int) -> int | None:
