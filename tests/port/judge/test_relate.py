@@ -26,6 +26,7 @@ def first(got, others=None):
         (0 * RIGHT, "0 everywhere"),
         (RIGHT[[1, 0, 2]], "axis 0 has the expected entries in the order [1, 0, 2]"),
         (RIGHT[[1, 2, 0]], "axis 0 has the expected entries in the order [1, 2, 0]"),
+        (np.ascontiguousarray(RIGHT.T).reshape(3, 5), "written with axes 0 and 1 in the other order of memory"),
         (RIGHT * [[1], [-1], [1]], "5 of 15 entries have the opposite sign"),
         (RIGHT * [[1], [0.5], [1]], "only at [1] of axis 0, there times 1/2"),
         (RIGHT - 0.5, "plus -0.5"),

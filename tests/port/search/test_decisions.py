@@ -30,6 +30,23 @@ FOUND = {
     "reverse_weight_not_decayed": "not dimmed by it",
     "reverse_own_included": "including the Gaussian itself",
 }
+ONE_OF_ALL = {  # operation, edits, words
+    "depth": (
+        "composite", [["image, far, sum_ = np.zeros((3, height, width)), np.zeros((height, width)), np.zeros((height,"
+                       " width))", "image, far, sum_ = np.zeros((3, height, width)), *np.zeros((2, height, width))\n"
+                       "    most = 0 * far"],
+                      ["far += weight * depth[n]",
+                       "far = np.where(weight > most, depth[n], far)\n        most = np.maximum(weight, most)"]],
+        "the depth of the Gaussian of the largest weight",
+    ),
+    "picture": (
+        "registration", [["1 - 2.5 * a**2 + 1.5 * a**3", "2 / 3 - a**2 + a**3 / 2"],
+                         ["2 - 4 * a + 2.5 * a**2 - 0.5 * a**3", "(2 - a)**3 / 6"],
+                         ["-5 * a + 4.5 * a**2", "-2 * a + 1.5 * a**2"],
+                         ["-4 + 5 * a - 1.5 * a**2", "-(2 - a)**2 / 2"]],
+        "the picture read by the cubic B-spline",
+    ),
+}  # fmt: skip
 OTHERS = {  # mistakes that are no convention of the lists, and none may be said of them
     "composite": ("dx, dy = columns - mean[0, n]", "dx, dy = 1.01 * (columns - mean[0, n])"),
     "masked_ssim": ("a1, a2 = 2 * mu_x * mu_y + C1", "a1, a2 = 2 * mu_x * mu_y * (1 + 0.01 * mu_x) + C1"),
@@ -54,6 +71,13 @@ def test_a_convention_is_said_in_words_with_its_line(name):
     said = sentences_on(MISTAKES[name])
     assert FOUND[name] in said[0] and ", definition/" in said[0], said
     assert said[-1].startswith("  (every "), said
+
+
+@pytest.mark.parametrize("what", ONE_OF_ALL)
+def test_another_depth_or_kernel_is_said_in_words(what):
+    operation, edit, words = ONE_OF_ALL[what]
+    said = sentences_on({"operation": operation, "edit": edit})
+    assert words in said[0], said
 
 
 def test_another_threshold_is_said_with_its_interval():

@@ -149,9 +149,27 @@ def test_rewrites_of_values_that_are_not_all_numbers_do_not_end_the_search():
         ("np.maximum(a, 1)", "(a) + 1e-8"),
         ("a[:, 1:4]", "a[:, 0:3]"),
         ("a.sum() / n", "(a.sum()) / np.size(a)"),
+        ("a + b", "np.maximum(a, b)"),
+        ("a.any(axis=0)", "a.sum(axis=0) > 1"),
+        ("a.sum(axis=(1, 2))", "np.take(a, [-1], 1).sum(axis=(1, 2))"),
+        ("a.sum(axis=(1, 2))", "np.delete(a, 0, 2).sum(axis=(1, 2))"),
+        ("np.median(a)", "np.sort(a, axis=None)[(np.size(a) - 1) // 2]"),
+        ("np.einsum('cki,k->ci', a, b)", "np.einsum('cki,k->ci', (a)[:, 1:, :], (b)[1:])"),
+        ("a @ b", "(a)[..., :-1] @ (b)[:-1]"),
     ],
 )
 def test_a_number_a_clamp_a_slice_or_a_count_in_another_place_is_tried(text, other):
     node = ast.parse(text, mode="eval").body
     assert other in [new for new, _ in rewrites(node, [np.ones(3)], False)]
     assert ast.unparse(node) == text  # the syntax tree stays as it is
+
+
+def test_a_real_number_in_a_condition_has_no_truth_value_in_its_place():
+    node = ast.parse("a", mode="eval").body
+    assert "True" in [text for text, _ in rewrites(node, [np.array([True, False])], truth=True)]
+    assert "True" not in [text for text, _ in rewrites(node, [np.float64(3.0)], truth=True)]
+
+
+def test_a_constant_is_tried_with_a_few_digits_rounded_and_cut_off():
+    texts = [text for text, _ in rewrites(ast.parse("2 * np.pi", mode="eval").body, [2 * np.pi], False)]
+    assert {"6.28", "6.2831", "6.2832", "6.283185"} <= set(texts)

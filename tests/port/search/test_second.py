@@ -3,13 +3,15 @@
 They were written from the port and the specification alone, and none is in the independent set beside that port.
 """
 
+from typing import Any
+
 import hand_port
 import measure
 import pytest
 from made_up_ports import cases_of
 
 from endotsr.port.judge.npy import write_npy
-from endotsr.port.search import changes
+from endotsr.port.search import changes, find
 from endotsr.port.search.find import apart, explained, sentences, together
 
 MISTAKES = {
@@ -89,6 +91,58 @@ MORE_MISTAKES = {
         "np.float32",
     ),
 }  # fmt: skip
+ALIKE = (
+    'fx * x / z + camera["cx"], fy * y / z + camera["cy"]', 'fx * x / z - camera["cx"], fy * y / z - camera["cy"]',
+)  # fmt: skip
+FAMILIES = {
+    "a term as a bound": (
+        "deformation", [("sigma**2 + 1e-4", "np.maximum(sigma**2, 1e-4)")],
+        "`np.maximum(width ** 2, 0.0001)` where `width ** 2 + 0.0001` is right: equation (B1)",
+    ),
+    "a relative change": (
+        "scene", [('i["position"] + offsets[:3] + shift', 'i["position"] * (1 + offsets[:3]) + shift')],
+        "`(position) * (1 + (psi[:3]))` where `position + psi[:3]` is right: definition/scene.py",
+    ),
+    "expressions of one form": (
+        "projection", [ALIKE],
+        "`(camera.fx * x / z) - (camera.cx)` where `camera.fx * x / z + camera.cx` is right, and "
+        "`(camera.fy * y / z) - (camera.cy)` where `camera.fy * y / z + camera.cy` is right: equation (B3)",
+    ),
+    "a sum that is overwritten": (
+        "exposure", [('"d_bias": g.sum((1, 2))', '"d_bias": g[:, 0].sum(1)')],
+        "`np.take(d_exposed, [0], 1).sum(axis=(1, 2))` where `d_exposed.sum(axis=(1, 2))` is right: equation (B13)",
+    ),
+    "an equality within a distance": (
+        "normalised_depth", [("finite & (depth == highest)", "finite & (depth >= highest - 1e9)")],
+        "`|depth - largest| <= ",
+    ),
+    "the same in both passes": (
+        "harmonics", [('(s["degree"] + 1) ** 2', '(s["degree"] + 1)')],
+        "`degree + 1` where `(degree + 1) ** 2` is right, and the same in harmonics_reverse: equation (B4)",
+    ),
+    "a constant with few digits": (
+        "dictionary", [("d_turn = 2 * np.pi * ", "d_turn = 6.283 * ")],
+        "`6.283` where `2 * np.pi` is right: equation (1)",
+    ),
+    "an expression, though a number gives the same decisions": (
+        "density", [('largest = np.exp(i["log_scale"]).max(0)', 'largest = np.exp(i["log_scale"]).min(0)')],
+        "definition with `np.exp(gaussians.log_scale[:, candidates]).min(axis=0)` where `np.exp(",
+    ),
+    "axes of another handedness": (
+        "pose", [('v, w, d = i["rotation_vector"], ', 'v, w, d = i["rotation_vector"] * [1, 1, -1], '),
+                 ('"d_rotation_vector": d_v', '"d_rotation_vector": d_v * [1, 1, -1]')],
+        "the input rotation_vector with the other sign at 2 of axis 0",
+    ),
+    "products without their first term": (
+        "motion", [('translation = np.einsum("dki,k->di", c, phi)',
+                    'translation = np.einsum("dki,k->di", c[:, 1:], phi[1:])')],
+        "(motion_coefficients)[:, 1:, :], (phi)[1:])` where `np.einsum('dkn,k->dn', motion_coefficients, phi)`",
+    ),
+    "one of two in the middle": (
+        "calibration", [("np.median(ratios)", "np.sort(ratios)[len(ratios) // 2]")],
+        "`np.sort(ratios, axis=None)[(np.size(ratios) - 0) // 2]` where `np.median(ratios)` is right",
+    ),
+}  # fmt: skip
 SECONDS = 60.0  # the searches end by themselves before
 
 
@@ -110,6 +164,21 @@ def test_every_kind_of_change_finds_a_mistake(golden, tmp_path, kind, monkeypatc
     text = "\n".join(sentences(found))
     known = (said,) if isinstance(said, str) else said  # exact words; changes that do the same are found in any order
     assert any(one in text for one in known) and f"(every output of its {len(found.cases)} cases)" in text
+
+
+@pytest.mark.parametrize("kind", FAMILIES)
+def test_every_family_of_changes_finds_a_mistake(golden, tmp_path, kind):
+    stage, edits, said = FAMILIES[kind]
+    text = "\n".join(sentences(search_on(golden, tmp_path, stage, *edits)))
+    assert said in text and "(every output of its " in text
+
+
+def test_an_output_that_the_definition_computes_with_too_few_digits_is_not_compared(golden, tmp_path, monkeypatch):
+    monkeypatch.setattr(find, "search", lambda stage, answered, *_: answered)
+    edit = ('"d_translation": g_d - w @ g_centre', '"d_translation": g_d + w @ g_centre')
+    compared: Any = {one.case.name: one.got.keys() for one in search_on(golden, tmp_path, "render", edit)}
+    assert "colour_image" in compared["render/needle"]
+    assert "colour_image" not in compared.get("render/long_needle", ())
 
 
 @pytest.mark.parametrize("kind", MORE_MISTAKES)

@@ -151,6 +151,12 @@ def _orders(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relatio
         if order is not None:
             text = f"axis {axis} has the expected entries in the order {list(order)}"
             yield Relation(kind="order", text=text, index=order)
+    for axis in range(len(shape) - 1):
+        if 1 < shape[axis] != shape[axis + 1] > 1:
+            turned = np.ascontiguousarray(pair.expected.swapaxes(axis, axis + 1)).reshape(shape)
+            if pair.close(turned):
+                text = f"written with axes {axis} and {axis + 1} in the other order of memory"
+                yield Relation(kind="transposed", text=text, index=(axis, axis + 1))
 
 
 def _order_of(pair: OutputPair, axis: int) -> tuple[int, ...] | None:

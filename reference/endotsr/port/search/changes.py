@@ -1,15 +1,16 @@
 """The changes of the definition that are tried for one operation, likely ones first.
 
-First come the conventions of other programs. For an operation with parts, numbers, other texts and other names of one
-expression in its own code follow. Then come settings and inputs read differently or for one another, entries of tuples
-exchanged, decisions at another number, and one expression in the remaining functions and in the constants. At the end
-come the order of statements, a part of an array, two numbers of a line, and an expression beside another. A trajectory
-has no conventions, no exchanges and no thresholds.
+First come the conventions of other programs, and settings and inputs read differently, for a part of the time. For an
+operation with parts, numbers, other texts and other names of one expression in its own code follow. Then come the other
+settings and inputs, those read for one another, entries of tuples exchanged, decisions at another number, and one
+expression in the remaining functions and in the constants. Changes of more than one expression follow: two of one form,
+a mean of means, the order of statements, a part of an array, two numbers of a line, and an expression beside another.
+At the end come texts of the expressions of which a small change leaves a wrong output as it is. A trajectory has no
+conventions, no exchanges and no thresholds.
 """
 
 import ast
 import contextlib
-import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -19,18 +20,34 @@ import numpy as np
 
 from endotsr.port.judge.store import Golden
 from endotsr.port.search.cases import Answered, of_the_parts
+from endotsr.port.search.conventions import together
 from endotsr.port.search.decisions import try_conventions, try_thresholds
 from endotsr.port.search.numbers import START, said_number
 from endotsr.port.search.places import Spot, Statement, definition_modules, executed, names_in, spots, written
 from endotsr.port.search.requests import OtherReading, exchanges, other_requests
 from endotsr.port.search.rewrites import rewrites, rounded, with_number
-from endotsr.port.search.second import SecondChange, at, beside, expressions, orders, pairs, parts, turned
-from endotsr.port.search.trial import LATEST, TELLING, Live, Trial, installed
+from endotsr.port.search.second import (
+    SecondChange,
+    alike,
+    at,
+    beside,
+    expressions,
+    in_both,
+    in_stages,
+    mean_of_means,
+    orders,
+    pairs,
+    parts,
+    turned,
+)
+from endotsr.port.search.trial import LATEST, TELLING, UNREACHED, Live, Trial, installed
 from endotsr.port.stages.stage import Outputs, Stage
 
 SECONDS = 16.0  # computing time of a search; `find` gives a trajectory more
 UNKNOWN = 1  # assumed number of outputs spoiled by a change of an expression, if unknown
+EARLY = 0.3  # of the time, for settings and inputs before the code of an operation with parts
 PART = 0.1  # of the time that is left, for the exchanges in tuples
+MOST_BESIDE = 6  # readings of a setting or an input that leave a wrong output as it is
 MOST_VALUES = 64  # examined values of an expression
 
 
@@ -44,6 +61,8 @@ def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: 
             "reverse": lambda: [one.reverse(stage, one.inputs, one.saved) for one in answered],
         }
         places = executed(calls)
+        for module in definition_modules():
+            module.__dict__.update(_at=at, _nth=found.counter.nth, _mean_of_means=mean_of_means)
         inner = of_the_parts(stage.name, golden)
         glue = [place for place in places if inner and not place.is_constant and place.name not in inner]
         if not found.length:
@@ -51,7 +70,7 @@ def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: 
         if not found.explains:  # a prepared description is the one to read, and single expressions need not be tried
             _all_places(found, places, glue)
     for module in definition_modules():
-        for name in ("_knob", "_seen", "_at", "_nth"):
+        for name in ("_knob", "_seen", "_at", "_nth", "_mean_of_means"):
             module.__dict__.pop(name, None)
     found.hits.sort(key=lambda hit: hit.rank)
     return found
@@ -63,13 +82,17 @@ def _all_places(trial: Trial, places: Sequence[Statement], glue: Sequence[Statem
     The last ones are tried in the operation itself alone, if it has code beside its parts.
     """
     functions = [place for place in places if not place.is_constant]
+    readings = other_requests([one.case for one in trial.cases], trial.golden.cases)
+    with trial.within(0 if trial.length else EARLY):
+        _requests(trial, readings)
     _places(trial, glue)
-    _requests(trial)
+    _requests(trial, readings)
     _exchanges(trial, places)
     try_thresholds(trial, functions)
     _places(trial, [place for place in functions if place not in glue])
     _places(trial, [place for place in places if place.is_constant])
     _second(trial, list(glue) or functions)
+    _other_texts(trial, [one for one in trial.live if one.late == UNREACHED])
 
 
 def _places(trial: Trial, places: Sequence[Statement]) -> None:
@@ -80,24 +103,44 @@ def _places(trial: Trial, places: Sequence[Statement]) -> None:
     long = any(one.length for one in trial.cases)
     live = _reached(trial, places, long)
     trial.live += live
-    for texts, rank in ((_texts, 1), (_names, 2)):
-        lines = {hit.where for hit in trial.hits if hit.rank[:2] < (0, 2) and not trial.discrete}
-        for one in live:
-            if not lines or one.spot.place.where(one.spot.node) in lines:
-                _try(trial, one, texts(one, trial.lower), rank)
+    _other_texts(trial, [one for one in live if one.late < UNREACHED])
+    _forms(trial, [] if long else places, live)
     for one in live if long and not trial.explains else ():
         if not trial.over:
             _solved(trial, one.spot, one.mode, one.values)
 
 
-def _requests(trial: Trial) -> None:
-    """Settings and inputs read differently; for a real setting, also the number that fits best."""
-    for request in other_requests([one.case for one in trial.cases], trial.golden.cases):
-        if trial.over:
-            return
+def _other_texts(trial: Trial, live: Sequence[Live]) -> None:
+    """Other texts of some spots, then other names."""
+    for texts, rank in ((_texts, 1), (_names, 2)):
+        lines = {hit.where for hit in trial.hits if hit.rank[:2] < (0, 2) and not trial.discrete}
+        for one in live:
+            if not lines or one.spot.place.where(one.spot.node) in lines:
+                _try(trial, one, texts(one, trial.lower), rank)
+
+
+def _requests(trial: Trial, readings: Iterator[OtherReading]) -> None:
+    """Settings and inputs read differently; for a real setting, also the number that fits best.
+
+    After MOST_BESIDE readings of one setting or input that change some of the wrong outputs, but not all, it is left.
+    """
+    while not trial.over and (request := next(readings, None)):
+        if trial.beside.get(request.of, 0) >= MOST_BESIDE:
+            continue
         with contextlib.suppress(Exception):
+            if request.at is None and not trial.reached(request):
+                trial.beside[request.of] = trial.beside.get(request.of, 0) + 1
+                continue
             for one in [request] if request.at is None else _best_fixed(trial, request.at, request.rest):
-                trial.note(trial.fits(None, "both", one), one.text, None, *one.rank)
+                _read(trial, one)
+
+
+def _read(trial: Trial, request: OtherReading) -> None:
+    """Note a misreading that fits; where decisions are wrong, an expression is likelier than a number."""
+    likely, less = request.rank
+    trial.note(
+        trial.fits(None, "both", request), request.text, None, likely + 2 * (trial.discrete and request.number), less
+    )
 
 
 def _exchanges(trial: Trial, places: Sequence[Statement]) -> None:
@@ -111,11 +154,10 @@ def _exchanges(trial: Trial, places: Sequence[Statement]) -> None:
         if trial.over:
             return
         with contextlib.suppress(Exception):
-            trial.note(trial.fits(None, "both", request), request.text, None, *request.rank)
-    end, trial.end = trial.end, min(trial.end, time.process_time() + PART * (trial.end - time.process_time()))
-    for place in [] if trial.explains else places:
-        _changes(trial, turned(place), 2)
-    trial.end = end
+            _read(trial, request)
+    with trial.within(PART):
+        for place in [] if trial.explains else places:
+            _changes(trial, turned(place), 2)
 
 
 def _best_fixed(trial: Trial, at: Callable[[float], OtherReading], rest: float) -> list[OtherReading]:
@@ -178,10 +220,9 @@ def _solved(trial: Trial, spot: Spot, mode: str, values: list[Any]) -> int:
 
     The rank is the number of right outputs of the first case that a small change spoils.
     """
-    late = LATEST
-    for text, rest in with_number(spot.node, values):
-        late = min(late, _number_at(trial, spot, mode, text, rest, 2 if isinstance(spot.node, ast.Constant) else 3))
-    return late
+    rank = 2 if isinstance(spot.node, ast.Constant) else 3
+    texts = with_number(spot.node, values)
+    return min((_number_at(trial, spot, mode, text, rest, rank) for text, rest in texts), default=LATEST)
 
 
 def _number_at(trial: Trial, spot: Spot, mode: str, text: str, rest: float, rank: int, words: str = "") -> int:
@@ -239,6 +280,8 @@ def _try(trial: Trial, one: Live, texts: Iterator[tuple[str, int]], rank: int) -
             whole, mode = trial.best(install, one.mode)
             kept = partial(_standing, one.spot, text) if mode == one.mode else None
             trial.note(whole, _replaced(one.spot, mode, text), one.spot, rank, less + less_likely, standing=kept)
+            if whole == "forward":
+                _changes(trial, in_both(one.spot, text, trial.live), rank)
 
 
 @contextlib.contextmanager
@@ -256,6 +299,15 @@ def _side(spot: Spot, mode: str) -> str:
     return "" if mode == "both" or len(spot.place.phases) == 1 else f", in the {mode} pass alone"
 
 
+def _forms(trial: Trial, places: Sequence[Statement], live: Sequence[Live]) -> None:
+    """Expressions of one form changed alike, and means of means, if nothing else explains both passes."""
+    for place in places:
+        of = [one for one in live if one.spot.place is place]
+        if not trial.explains:
+            _changes(trial, alike([(one.spot, one.values) for one in of]))
+            _changes(trial, (change for one in of for change in in_stages(one.spot, names_in(place))))
+
+
 def _second(trial: Trial, places: Sequence[Statement]) -> None:
     """Changes of more than one expression, of a part of an array and of the order.
 
@@ -263,8 +315,6 @@ def _second(trial: Trial, places: Sequence[Statement]) -> None:
     """
     if trial.explains or trial.wrong < TELLING:
         return
-    for module in definition_modules():
-        module.__dict__.update(_at=at, _nth=trial.counter.nth)
     places = [place for place in places if trial.forward_refused or "reverse" in place.phases]
     live = sorted((one for one in trial.live if one.spot.place in places), key=lambda one: one.late)
     for place in places:
@@ -280,11 +330,12 @@ def _second(trial: Trial, places: Sequence[Statement]) -> None:
 
 
 def _changes(trial: Trial, changes: Iterator[SecondChange], rank: int = 4) -> None:
-    for spot, text, writing in changes:
+    for spot, text, writing, other in changes:
         if trial.over:
             return
         with contextlib.suppress(Exception):
             with writing:
-                install = spot.place.compiled()
-            whole, mode = trial.best(install, trial.modes(spot.place)[0])
-            trial.note(whole, f"{text}{_side(spot, mode)}", spot, rank, 0)
+                install = together([place.compiled() for place in (spot.place, other) if place])
+            whole, mode = trial.best(install, "both" if other else trial.modes(spot.place)[0])
+            if not other or (whole, mode) == ("all", "both"):  # of two passes, both are explained or nothing is said
+                trial.note(whole, f"{text}{_side(spot, mode)}", spot, rank, 0)

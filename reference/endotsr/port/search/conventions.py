@@ -42,19 +42,25 @@ def prepared(convention: Convention) -> ChangedDefinition:
         texts[name] = text.replace(old, new)
     installs = [_statement(name, ast.parse(text).body[0]).compiled() for name, text in texts.items()]
 
-    def install() -> Callable[[], Any]:
-        with ExitStack() as undone:
-            for one in installs:
-                undone.callback(one())
-            return undone.pop_all().close
-
     first, old, _ = convention.changes[0]
     statement = _node(first)
     place = _statement(first, statement)
     line = statement.lineno + _source(first).partition(old)[0].count("\n")
     marked = ast.copy_location(ast.Pass(), statement)
     marked.lineno = line
-    return ChangedDefinition(convention.said, Spot(place, marked, ()), install, frozenset(texts))
+    return ChangedDefinition(convention.said, Spot(place, marked, ()), together(installs), frozenset(texts))
+
+
+def together(installs: Sequence[Callable[[], Any]]) -> Callable[[], Any]:
+    """One function that installs several changes, and returns a function that undoes all of them."""
+
+    def install() -> Callable[[], Any]:
+        with ExitStack() as undone:
+            for one in installs:
+                undone.callback(one())
+            return undone.pop_all().close
+
+    return install
 
 
 def _statement(name: str, node: Any) -> Statement:

@@ -26,6 +26,7 @@ FACTORS = (1e-6, 1e-3, 1e-2, 0.1, 0.25, 0.7, 0.85, 0.95, 0.99, 1.01, 1.05, 1.15,
 ROUNDS = 5  # refinements of the best factor
 FEWER = 0.8  # largest fraction of the wrong entries that is left at a factor that is refined
 HALVINGS = 12  # of either end of the interval of a threshold
+WIDE = 100.0  # ratio of the ends of an interval
 KNOWN = (1 / 256, 1 / 255, 1 / 128, 1 / 512, 1e-3, 1e-4, 1e-6, 0.2, 0.01)
 """Thresholds of other programs."""
 
@@ -57,6 +58,11 @@ class Interval(NamedTuple):
 
     low: float
     high: float
+
+    @property
+    def wide(self) -> bool:
+        """Whether the outputs hardly determine the number: an expression that explains them is likelier."""
+        return self.high > WIDE * abs(self.low)
 
     def numbers(self) -> list[float]:
         """Numbers of the interval: those of other programs, those of one and two digits, the middle, five others."""
@@ -129,37 +135,51 @@ def try_thresholds(trial: Trial, places: Sequence[Statement]) -> None:
 def _compared(trial: Trial, spot: Spot) -> None:
     node, names = spot.node, spot.place.module.__dict__
     assert isinstance(node, ast.Compare)
-    sign = SIGNS.get(type(node.ops[0]))
-    if sign is None or len(node.ops) > 1:
+    if len(node.ops) > 1 or not isinstance(node.ops[0], (ast.Eq, *SIGNS)):
         return
     left, right = ast.unparse(node.left), ast.unparse(node.comparators[0])
-    mode, seen = trial.modes(spot.place)[0], list[float]()
-
-    def looked(value: float) -> float:
-        seen.append(value)
-        return value
-
-    names["_seen"] = looked
-    with written(spot, f"({left}) {sign} _seen({right})"):
-        trial.outputs(spot.place.compiled(), mode)
-    if not seen or any(np.ndim(value) or value != seen[0] for value in seen):
+    mode = trial.modes(spot.place)[0]
+    equal = isinstance(node.ops[0], ast.Eq)
+    near, rest = f"np.abs(({left}) - ({right})) <=", 0.0
+    if not equal:
+        near = f"({left}) {SIGNS[type(node.ops[0])]}"
+        rest = _constant(trial, spot, f"{near} _seen({right})", mode)
+    if rest is None:
         return
-    with written(spot, f"({left}) {sign} _knob"):
+    with written(spot, f"{near} _knob"):
         install = spot.place.compiled()
 
     def wrong(number: float) -> int:
         names["_knob"] = number
         return differing(trial, trial.outputs(install, mode))
 
-    found = threshold(wrong, float(seen[0]))
+    found = threshold(wrong, rest)
     for number in found.numbers() if found else ():
         names["_knob"] = number
         whole, phases = trial.best(install, mode)
         if whole and found:
             alone = f", in the {phases} pass alone" if phases != "both" and len(spot.place.phases) > 1 else ""
-            text = said(number, found, float(seen[0]), trial.cases[0].case.name)
-            trial.note(whole, f"`{left} {sign} {text}`{alone}", spot, 1, 3)
+            case = trial.cases[0].case.name
+            text = f"{left} {SIGNS[type(node.ops[0])]} {said(number, found, rest, case)}" if not equal else (
+                f"|{left} - {right}| <= {number:.6g}`{extent(found, case)} where `{left} == {right}"
+            )  # fmt: skip
+            trial.note(whole, f"`{text}`{alone}", spot, 1 + found.wide, 3)
             return
+
+
+def _constant(trial: Trial, spot: Spot, text: str, mode: str) -> float | None:
+    """The right side of a comparison, if it is the same number at each evaluation."""
+    seen = list[float]()
+
+    def looked(value: float) -> float:
+        seen.append(value)
+        return value
+
+    spot.place.module.__dict__["_seen"] = looked
+    with written(spot, text):
+        trial.outputs(spot.place.compiled(), mode)
+    same = bool(seen) and not any(np.ndim(value) or value != seen[0] for value in seen)
+    return float(seen[0]) if same else None
 
 
 def said(number: float, found: Interval, right: float, case: str) -> str:
@@ -185,5 +205,5 @@ def _fixed(trial: Trial, at: Callable[[float], OtherReading], rest: float) -> No
         whole = trial.fits(None, "both", at(number))
         if whole and found:
             text = f"{at(number).text}{extent(found, trial.cases[0].case.name)}"
-            trial.note(whole, text, None, 1, 2)
+            trial.note(whole, text, None, 1 + found.wide, 2)
             return

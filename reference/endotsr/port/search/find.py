@@ -33,23 +33,29 @@ def explained(golden: Golden, outputs: Path, precision: Precision, level: int, o
     one may be unreadable, of another shape, or asked only to equal another output.
     """
     stage = definition_stages().get(operation)
+    if stage is None:
+        raise InputError(f"{operation}: not computed by the definition")
     cases = [case for case in golden.cases if case.operation == operation and case.level <= level]
     reports = judge(golden._replace(cases=cases), outputs, precision, level=min(level, 4)).cases
     answered = [Answered(golden, *pair, outputs, precision) for pair in zip(cases, reports)]
+    for one in answered:
+        one.keep_reproduced(stage)
     answered = [one for one in answered if one.got]
     answered.sort(key=_order)
-    if stage is None or not answered or not answered[0].refused:
+    if not answered or not answered[0].refused:
         raise InputError(f"{operation}: nothing to explain")
     return search(stage, answered, golden, seconds * (LONG if answered[0].length else 1))
 
 
 def together(trial: Trial, seconds: float) -> list[str]:
-    """Two changes that explain every output together, if the likeliest one explains the forward outputs alone.
+    """Two changes that explain every output together, if the likeliest one explains the forward outputs or most cases.
 
     The second one is searched for in the definition with the first one.
     """
     first = trial.hits[0] if trial.hits else None
-    if first is None or first.whole != "forward" or first.standing is None or trial.length:
+    if first is None or first.standing is None or trial.length or trial.discrete:
+        return []
+    if first.whole not in ("forward", "most"):
         return []
     with first.standing():
         beside = sorted((one.beside(trial.stage) for one in trial.cases), key=_order)

@@ -1,4 +1,4 @@
-"""Decisions that another program may take for SSIM and the pyramid, each as a change of the definition.
+"""Decisions that another program may take for SSIM, the pyramid and the reading of a picture, each as a change.
 
 Windows, borders and masks differ between libraries. `conventions.py` makes the changes.
 """
@@ -17,6 +17,7 @@ _TAPS, _FOLDED = "(1, 4, 6, 4, 1)", "k = tap % max(2 * (n - 1), 1)"
 _ENTRY = "matrix[row, k if k < n else 2 * (n - 1) - k] += weight / 16"
 _INTERPOLATED = "return np.stack([np.interp(at, coarse, unit) for unit in np.eye(coarse.size)], axis=1)"
 _COARSE = ("laplacian.support_masks", "coarse = ~(d_rows @ ~valid @ d_columns.T)")
+_KEYS = "registration.keys"
 _LOSS = "laplacian.laplacian_loss_forward"
 
 
@@ -67,6 +68,22 @@ def _pyr_up(said: str, scale: str) -> Convention:
     ))  # fmt: skip
 
 
+def _sampled(said: str, near: tuple[str, str], far: tuple[str, str] = ("0 * r", "0 * r")) -> Convention:
+    """A picture read by another kernel: its value and slope at a distance below 1, and from 1 to 2."""
+    return Convention(f"the picture read {said}, not by the kernel of Keys with a = -1/2", (
+        (_KEYS, "1 - 2.5 * r**2 + 1.5 * r**3, 2 - 4 * r + 2.5 * r**2 - 0.5 * r**3", f"{near[0]}, {far[0]}"),
+        (_KEYS, "-5 * r + 4.5 * r**2, -4 + 5 * r - 1.5 * r**2", f"{near[1]}, {far[1]}"),
+    ))  # fmt: skip
+
+
+def _keys(a: float) -> Convention:
+    return _sampled(
+        f"by that with a = {a:g}",
+        (f"({a} + 2) * r**3 - ({a} + 3) * r**2 + 1", f"3 * ({a} + 2) * r**2 - 2 * ({a} + 3) * r"),
+        (f"{a} * (r**3 - 5 * r**2 + 8 * r - 4)", f"{a} * (3 * r**2 - 10 * r + 8)"),
+    )
+
+
 OF_IMAGES: tuple[Convention, ...] = (
     *map(_window, (5, 7, 9, 13)),
     *map(_uniform, (7, 8, 11)),
@@ -100,6 +117,10 @@ OF_IMAGES: tuple[Convention, ...] = (
     Convention("the SSIM of the mean of the channels", (
         (_SSIM, _X, f"0 * rendered + {_X}.mean(axis=0)"), (*_Y, f"0 * observed + {_Y[1]}.mean(axis=0)"),
     )),
+    _sampled("bilinearly", ("1 - r", "0 * r - 1")),
+    _sampled("by the cubic B-spline", ("2 / 3 - r**2 + r**3 / 2", "1.5 * r**2 - 2 * r"),
+             ("(2 - r) ** 3 / 6", "-((2 - r) ** 2) / 2")),
+    *map(_keys, (-0.75, -1)),
     _taps("1 2 1", "(0, 4, 8, 4, 0)"),
     _taps("1 1 (the mean of two pixels)", "(0, 0, 8, 8, 0)"),
     _taps("1 1 1 1 1", "(3.2, 3.2, 3.2, 3.2, 3.2)"),

@@ -31,14 +31,19 @@ class OtherReading(NamedTuple):
     tell: Callable[[Outputs], Outputs] = lambda found: found
     at: "Callable[[float], OtherReading] | None" = None  # the same with another number
     rest: float = 0.0  # the number of the first case
+    of: str = ""  # the setting or input
+    number: bool = False  # of a number: other numbers may give the same decisions
 
 
 def other_requests(cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[OtherReading]:
-    """Misreadings of the requests of one operation, settings first; inputs are those of the first case."""
-    for path in dict.fromkeys(path for case in cases for path in leaves(case.settings)):
-        yield from _settings(path, cases, all_cases)
+    """Misreadings of the requests of one operation, settings first, those in no section before others.
+
+    Inputs are those of the first case.
+    """
+    for path in sorted(dict.fromkeys(path for case in cases for path in leaves(case.settings)), key=len):
+        yield from (one._replace(of=".".join(path)) for one in _settings(path, cases, all_cases))
     for name, array in cases[0].inputs.items():
-        yield from _inputs(name, array.shape, array.dtype)
+        yield from (one._replace(of=name) for one in _inputs(name, array.shape, array.dtype))
 
 
 def exchanges(cases: Sequence[Case]) -> Iterator[OtherReading]:
@@ -49,9 +54,8 @@ def exchanges(cases: Sequence[Case]) -> Iterator[OtherReading]:
         if one[:-1] == other[:-1] and all(map(_are_numbers, pairs)) and any(first != second for first, second in pairs):
             yield OtherReading(f"{'.'.join(one)} and {'.'.join(other)} exchanged", (0, 1), partial(_turned, one, other))
             for path, read in ((one, other), (other, one)):
-                yield OtherReading(
-                    f"{'.'.join(read)} in place of {'.'.join(path)}", (0, 0), partial(_copied, path, read)
-                )
+                text = f"{'.'.join(read)} in place of {'.'.join(path)}"
+                yield OtherReading(text, (0, 0), partial(_copied, path, read), number=True)
     for (a, first), (b, second) in combinations(cases[0].inputs.items(), 2):
         if (first.shape, first.dtype) == (second.shape, second.dtype):
             tell = partial(_turned_outputs, f"d_{a}", f"d_{b}")
@@ -120,7 +124,8 @@ def _settings(path: tuple[str, ...], cases: Sequence[Case], all_cases: Sequence[
         yield _fixed_at(path, seen[0])._replace(at=partial(_fixed_at, path), rest=seen[0])
     name = ".".join(path)
     for rule, change in (NUMBER_RULES if numbers else SWITCH_RULES if switches else {}).items():
-        yield OtherReading(f"{rule} {name} in place of {name}", (0, 1), partial(_changed, path, change))
+        text = f"{rule} {name} in place of {name}"
+        yield OtherReading(text, (0, 1), partial(_changed, path, change), number=numbers)
 
 
 def _can_be_fixed(value: Any) -> bool:
@@ -133,7 +138,8 @@ def _fixed_at(path: tuple[str, ...], value: Any) -> OtherReading:
     def ask(inputs: Inputs, settings: Settings) -> tuple[Inputs, Settings]:
         return inputs, with_value(settings, path, value) if _has(settings, path) else settings
 
-    return OtherReading(f"{'.'.join(path)} fixed at {value!r}", (0, 0), ask)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return OtherReading(f"{'.'.join(path)} fixed at {value!r}", (0, 0), ask, number=number)
 
 
 def _changed(
@@ -148,7 +154,10 @@ def _has(settings: Settings, path: Sequence[str]) -> bool:
 
 
 def _inputs(name: str, shape: tuple[int, ...], kind: str) -> Iterator[OtherReading]:
-    """An input and its gradient, or a cotangent, in another order; an input with another sign or unit."""
+    """An input and its gradient, or a cotangent, in another order; another sign, of all or at one index; another unit.
+
+    The sign of one index is that of axes with another handedness.
+    """
     for axis, size in enumerate(shape):
         if 1 < size <= MOST_ORDERED:
             yield from (_ordered(name, axis, np.array(order)) for order in list(permutations(range(size)))[1:])
@@ -175,6 +184,10 @@ def _inputs(name: str, shape: tuple[int, ...], kind: str) -> Iterator[OtherReadi
         for text, factor in (("-1", -1.0), ("2", 2.0), ("1/2", 0.5), ("255", 255.0), ("1/255", 1 / 255),
                              ("pi/180", np.pi / 180)):  # fmt: skip
             yield _mapped(name, f"times {text}", lambda a, f=factor: a * f, lambda a, f=factor: a * f, (2, 1))
+        for axis, size in enumerate(shape):
+            for k in range(size if 1 < size <= MOST_ORDERED else 0):
+                flip = partial(_flipped, axis, k)
+                yield _mapped(name, f"with the other sign at {k} of axis {axis}", flip, flip, (2, 1))
         yield _mapped(name, "taken as 0", lambda a: 0 * a, lambda a: 0 * a, (2, 1))
 
 
@@ -187,6 +200,13 @@ def _stored(axis: int) -> Callable[[NDArray], NDArray]:
         return np.ascontiguousarray(array).reshape(shape).swapaxes(axis, axis + 1)
 
     return change
+
+
+def _flipped(axis: int, index: int, array: NDArray) -> NDArray:
+    """The array with the other sign at one index of an axis."""
+    signs = np.ones(array.shape[axis])
+    signs[index] = -1
+    return array * signs.reshape(-1, *[1] * (array.ndim - 1 - axis))
 
 
 def _swapped(size: int, a: int, b: int) -> NDArray:

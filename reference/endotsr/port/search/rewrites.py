@@ -17,10 +17,11 @@ TWINS = (
     "sum max", "mean sum", "median mean", "median min", "median max", "mean median", "ceil floor", "ceil rint",
     "round floor", "round ceil", "rint floor", "rint trunc", "trunc floor", "trunc rint", "tanh arctan", "cosh sinh",
     "tile repeat", "any all", "all any", "zeros ones", "ones zeros", "sign abs", "unique sort", "minimum maximum",
+    "mean max", "mean min",
 )  # fmt: skip
 """A function, and one that may be taken for it."""
 OPERATORS: dict[type, str] = {
-    ast.Add: "{l}; {r}; ({l}) - ({r}); ({r}) - ({l}); 2 * ({l}); 2 * ({r})",
+    ast.Add: "{l}; {r}; ({l}) - ({r}); ({r}) - ({l}); 2 * ({l}); 2 * ({r}); np.maximum({l}, {r}); ({l}) * (1 + ({r}))",
     ast.Sub: "{l}; -({r}); ({l}) + ({r}); ({r}) - ({l})",
     ast.Mult: "{l}; {r}; ({l}) / ({r}); ({r}) / ({l}); ({l}) + ({r})",
     ast.Div: "{l}; 1 / ({r}); ({l}) * ({r}); ({r}) / ({l}); ({l}) / ({r}) ** 2; ({l}) / np.sqrt({r}); ({l}) // ({r})",
@@ -28,7 +29,8 @@ OPERATORS: dict[type, str] = {
     ast.Mod: "{l}; ({l}) // ({r})",
     ast.Pow: "{l}; ({l}) ** (({r}) + 1); ({l}) ** (({r}) - 1); ({l}) ** (2 * ({r})); np.abs({l}); np.sqrt({l}); "
     "1 + (({l}) - 1) * ({r})",
-    ast.MatMult: "{l}; {r}; ({l}).T @ ({r}); ({l}) @ ({r}).T; ({r}) @ ({l}); (({l}) @ ({r})).T; ({l}).T @ ({r}).T",
+    ast.MatMult: "{l}; {r}; ({l}).T @ ({r}); ({l}) @ ({r}).T; ({r}) @ ({l}); (({l}) @ ({r})).T; ({l}).T @ ({r}).T; "
+    "({l})[..., :-1] @ ({r})[:-1]; ({l})[..., 1:] @ ({r})[1:]",
     ast.BitAnd: "{l}; {r}; ({l}) | ({r})",
     ast.BitOr: "{l}; {r}; ({l}) & ({r})",
 }
@@ -48,7 +50,8 @@ def rewrites(node: ast.expr | ast.stmt, values: Sequence[Any], truth: bool) -> I
         yield "pass", 0
         return
     text = ast.unparse(node)
-    if truth or isinstance(node, ast.Compare | ast.BoolOp):
+    yield from ((other, 0) for other in _fewer_digits(node))
+    if (truth and not any(is_real(value) for value in values)) or isinstance(node, ast.Compare):
         yield from (("True", 0), ("False", 0), (f"~({text})", 2))
     yield from ((other, 1 if other in text else 2) for other in _rewrites(node))
     if not truth and not isinstance(node, ast.Constant | ast.Compare | ast.BoolOp):
@@ -85,6 +88,18 @@ def _rewrites(node: ast.expr) -> Iterator[str]:
     yield from dict.fromkeys(ast.unparse(n) for n in inner[1:12] if "np" not in ast.unparse(n)[:3])
 
 
+def _fewer_digits(node: ast.expr) -> Iterator[str]:
+    """An irrational constant with a few digits, rounded or cut off: 3.14, 3.1415, 3.1416."""
+    names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+    if names != {"np"} or not isinstance(node, ast.Attribute | ast.BinOp | ast.Call):
+        return
+    value = eval(compile(ast.Expression(ast.parse(ast.unparse(node), mode="eval").body), "", "eval"), {"np": np})
+    if isinstance(value, float) and np.isfinite(value) and float(f"{value:.6g}") != value:
+        tens = [10.0 ** (digits - 1 - int(np.floor(np.log10(abs(value))))) for digits in range(2, 9)]
+        cut = [float(f"{round_to(value * ten) / ten:.12g}") for ten in tens for round_to in (np.round, np.trunc)]
+        yield from dict.fromkeys(map(repr, cut))
+
+
 def _regrouped(node: ast.expr) -> Iterator[ast.expr]:
     """Operands moved into or out of a product, power, clamp or function of one argument: a (b + c), sqrt(a + b)."""
     match node:
@@ -117,13 +132,18 @@ def _shifted(node: ast.expr) -> Iterator[str]:
                 yield ast.unparse(other)
 
 
+def is_real(value: Any) -> bool:
+    """Whether an observed value is a real number or an array of them."""
+    return np.asarray(value).dtype.kind == "f"
+
+
 def _clamps(function: ast.expr) -> bool:
     return ast.unparse(function) in ("np.clip", "np.maximum", "np.minimum", "max", "min")
 
 
 def rounded(node: ast.expr | ast.stmt, values: Sequence[Any], lower: str) -> Iterator[tuple[str, int]]:
     """A real expression computed in a lower precision from here on, or only rounded to it."""
-    if lower and isinstance(node, ast.expr) and any(np.asarray(value).dtype.kind == "f" for value in values):
+    if lower and isinstance(node, ast.expr) and any(is_real(value) for value in values):
         text = ast.unparse(node)
         yield f"np.{lower}({text})", 0
         yield f"np.float64(np.{lower}({text}))", 0
@@ -149,6 +169,7 @@ def _wrapped(values: Sequence[Any]) -> Iterator[str]:
         yield from ["np.minimum({}, 1)", "np.clip({}, -1, 1)"] * any((np.abs(a) > 1).any() for a in arrays)
         yield from ["np.clip({}, 0, 1)"] * any(((a < 0) | (a > 1)).any() for a in arrays)
         yield from ("1 / (1 + np.exp(-({})))", "np.tanh({})", "np.maximum({}, 1e-8)")
+        yield from ["1.0"] * all(a.ndim == 0 for a in arrays)  # a weight that is left out
         yield from ["np.sqrt({})"] * all((a >= 0).all() for a in arrays)
     elif any(a.ndim == 0 and a.dtype.kind in "iu" for a in arrays):
         yield from ("({}) + 1", "({}) - 1", "0", "1")
@@ -164,8 +185,6 @@ def _wrapped(values: Sequence[Any]) -> Iterator[str]:
 def _other_calls(node: ast.Call) -> Iterator[str]:
     function, arguments = ast.unparse(node.func), [ast.unparse(a) for a in node.args]
     name = function.rpartition(".")[2]
-    if name in ("sum", "mean"):
-        yield from _fewer(node, function, arguments)
     if isinstance(node.func, ast.Attribute) and function != f"np.{name}":
         owner = ast.unparse(node.func.value)
         yield owner
@@ -174,17 +193,27 @@ def _other_calls(node: ast.Call) -> Iterator[str]:
     yield from arguments
     if name == "exp":
         yield f"1 + ({arguments[0]})"
+    if name == "einsum":
+        yield from _shorter(node)
+    if name == "median":  # one of the two in the middle, not their mean
+        yield from (f"np.sort({arguments[0]}, axis=None)[(np.size({arguments[0]}) - {k}) // 2]" for k in (0, 1))
     if name == "linspace":  # other conventions of the sample positions
         a, b, n = arguments
         yield from (f"({a}) + (({b}) - ({a})) * (np.arange({n}) + {k}) / ({n})" for k in (0, 0.5, 1))
         yield f"np.linspace({a}, {b}, ({n}) + 2)[1:-1]"
     rest = ast.unparse(node)[len(function) :]
-    yield from (function[: -len(name)] + pair.split()[1] + rest for pair in TWINS if pair.split()[0] == name)
+    if name == "any":
+        yield f"{function[:-3]}sum{rest} > 1"
     words = [ast.unparse(word) for word in node.keywords]
+    own = ", ".join([*arguments, *(word for word in words if not word.startswith("initial="))])
+    for other in (pair.split()[1] for pair in TWINS if pair.split()[0] == name):
+        yield from dict.fromkeys(function[: -len(name)] + other + given for given in (rest, f"({own})"))
     yield from (f"{function}({', '.join([*arguments, *words[:k], *words[k + 1 :]])})" for k in range(len(words)))
     for k in range(len(arguments) - 1):
         turned = [*arguments[:k], arguments[k + 1], arguments[k], *arguments[k + 2 :]]
         yield f"{function}({', '.join([*turned, *words])})"
+    if name in ("sum", "mean"):
+        yield from _fewer(node, function, arguments)
 
 
 def _other_guards(node: ast.Call) -> Iterator[str]:
@@ -213,18 +242,37 @@ def _other_counts(node: ast.BinOp) -> Iterator[str]:
 
 
 def _fewer(node: ast.Call, function: str, arguments: Sequence[str]) -> Iterator[str]:
-    """A sum or mean without its first or last element; a mean with its number of elements less 1 as divisor."""
+    """A sum or mean without its first or last element, or of this one alone; a mean with one element less as divisor.
+
+    A sum that is overwritten instead of added to has one element alone.
+    """
     whole, own = ast.unparse(node), function in ("np.sum", "np.mean")
     summed = arguments[0] if own else function.rpartition(".")[0]
     axis = next((ast.unparse(word.value) for word in node.keywords if word.arg == "axis"), "")
     axis = arguments[-1] if not axis and len(arguments) > own else axis
-    if whole.count(summed) == 1:
-        for end in (-1, 0):
-            yield whole.replace(
-                summed, f"np.delete({summed}, {end}, {axis})" if axis else f"({summed})[{end + 1}:{end or ''}]"
-            )
+    before = whole[: len(function) + 1] if own else ""
+    after = whole[len(before) + len(summed) :]
+    for end, along in product((-1, 0), axis.strip("()").split(", ")):
+        cut = f"np.delete({summed}, {end}, {along})" if along else f"({summed})[{end + 1}:{end or ''}]"
+        yield from (f"{before}{part}{after}" for part in (cut, f"np.take({summed}, [{end}], {along or 0})"))
     if function.endswith("mean"):
         yield f"{whole} * np.size({summed}) / (np.size({summed}) - np.size({whole}))"
+
+
+def _shorter(node: ast.Call) -> Iterator[str]:
+    """A sum of products without the first or the last value of one of its summed indices."""
+    match node.args:
+        case [ast.Constant(value=str() as text), *operands] if "->" in text:
+            terms, _, result = text.partition("->")
+        case _:
+            return
+    for letter in dict.fromkeys(c for c in terms if c not in f",{result}"):
+        for part in (":-1", "1:"):
+            cut = [
+                f"({ast.unparse(one)})[{', '.join(part if c == letter else ':' for c in term)}]"
+                for one, term in zip(operands, terms.split(","))
+            ]
+            yield f"np.einsum({text!r}, {', '.join(cut)})"
 
 
 def _other_sums(text: str) -> Iterator[str]:

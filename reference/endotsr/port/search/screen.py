@@ -13,6 +13,7 @@ _WANTED = "live & box & ~(alpha.real < settings.alpha_cutoff)"
 _ALL = ("compositing.reach_ellipse", "return (squared >= 0) &", "return np.ones_like(squared, bool) |")
 _MIDDLE = "(a[i] + c[i]) / 2"
 _RADIUS = f"np.ceil(3 * np.sqrt({_MIDDLE} + np.sqrt(max(0.1, ({_MIDDLE}) ** 2 - projected.determinant[i]))))"
+_COMPOSED, _SUMMED = "compositing.composite_forward", "depth = depth + weight * projected.depth[layer.index]"
 _POLYNOMIALS = "harmonics.POLYNOMIALS"
 _REVERSE = "compositing.composite_reverse"
 _POWER = "value * front * (own - rest)"
@@ -37,6 +38,11 @@ def _tiles(size: int) -> Convention:
         ("(at // 16 >= first) & (at // 16 < last)", f"(at // {size} >= first) & (at // {size} < last)"),
     )
     return Convention(f"tiles of {size} pixels, not of 16", tuple((name, *change) for change in changes))
+
+
+def _depth(said: str, depth: str) -> Convention:
+    """The depth of one Gaussian in the place of the sum of all."""
+    return Convention(f"the depth {said}, not the sum of weighted depths", ((_COMPOSED, _SUMMED, f"depth = {depth}"),))
 
 
 def _radius(said: str, radius: str) -> Convention:
@@ -103,6 +109,14 @@ OF_THE_SCREEN: tuple[Convention, ...] = (
     Convention("the depth divided by the opacity", (
         ("compositing.composite_forward", "Composite(image, depth,",
          "Composite(image, depth / np.where(opacity == 0, 1, opacity),"),
+    )),
+    _depth("of the last Gaussian in front of which more than half of the light is left (the median depth)",
+           "np.where(layer.taken & (layer.front > 0.5), projected.depth[layer.index], depth)"),
+    _depth("of the first Gaussian", "np.where(layer.taken & (opacity == 0), projected.depth[layer.index], depth)"),
+    Convention("the depth of the Gaussian of the largest weight, not the sum of weighted depths", (
+        (_COMPOSED, "depth = opacity = 0 * t", "depth = opacity = most = 0 * t"),
+        (_COMPOSED, _SUMMED, "depth, most = np.where(weight > most, projected.depth[layer.index], depth), "
+                             "np.maximum(most, weight)"),
     )),
     Convention("the distance from the camera taken as the depth", (
         (_VISIBLE, "a * c - b * b, z])", "a * c - b * b, np.sqrt(x * x + y * y + z * z)])"),

@@ -21,6 +21,7 @@ from endotsr.port.search.second import Counter
 from endotsr.port.stages.stage import Outputs, Stage
 
 LATEST = 1000  # rank of a spot with unknown reach
+UNREACHED = 1001  # rank of a spot at which a small change leaves a wrong output as it is
 ENOUGH = 40  # equal explanations that end the search
 MOST = 3  # smallest number of explained cases with refused outputs beside which one may stay unexplained
 TELLING = 8  # smallest number of wrong entries for which any number, or an explanation of a part, is accepted
@@ -73,6 +74,7 @@ class Trial:
         self.live: list[Live] = []
         self.counter = Counter()
         self.tried = 0
+        self.beside: dict[str, int] = {}  # readings of a setting or input that leave a wrong output as it is
         self.unlike = ""  # the refused case that the last change does not explain, if it explains the others
         self.matched = False  # the last change reproduces the forward outputs of a case with a refused one
         for one in answered:
@@ -94,6 +96,16 @@ class Trial:
     def over(self) -> bool:
         """Whether the time is over or enough has been found."""
         return time.process_time() > self.end or len(self.hits) >= ENOUGH
+
+    @contextlib.contextmanager
+    def within(self, part: float) -> Iterator[None]:
+        """A context in which a part of the time that is left is at hand."""
+        end, now = self.end, time.process_time()
+        self.end = min(end, now + part * (end - now))
+        try:
+            yield
+        finally:
+            self.end = end
 
     @property
     def explains(self) -> bool:
@@ -169,20 +181,37 @@ class Trial:
     def number(self, at: Callable[[float], Outputs], rest: float) -> tuple[list[tuple[float, bool]], int]:
         """Numbers to try, as `plain_first` orders them, and the number of right outputs that a small step spoils.
 
-        That number is LATEST - 1 if the step changes nothing.
+        That number is LATEST - 1 if the step changes nothing, and UNREACHED if it leaves a wrong output as it is.
         """
         one = self.cases[0]
 
         def off(value: float) -> Any:
             return one.distance(at(value), self.fitted)
 
-        moved = at(rest + START * (abs(rest) or 1.0))
-        number = best_number(off, rest, one.distance(one.right, self.fitted)) if self.fitted else None
-        late = one.spoiled(moved)
+        moved = at(rest + START * (abs(rest) or 1.0) if self.fitted else np.nan)
+        if not self.reaches(moved):
+            return [], UNREACHED if self.moves(moved) or not self.fitted else LATEST - 1
+        if not self.fitted:
+            return [], LATEST - 1
+        number = best_number(off, rest, one.distance(one.right, self.fitted))
         known = number is not None and abs(number - rest) > START
         numbers = plain_first(number) if number is not None and known else []
-        numbers = [one for one in numbers if one[1] or self.wrong >= TELLING]
-        return numbers, late if self.moves(moved) else LATEST - 1
+        return [one for one in numbers if one[1] or self.wrong >= TELLING], one.spoiled(moved)
+
+    def reached(self, request: OtherReading) -> bool:
+        """Whether a misreading changes the wrong outputs of the first case, in the pass that is to be explained."""
+        one = self.cases[0]
+        forward, saved = one.forward(self.stage, *request.ask(one.inputs, one.settings))
+        return self.reaches(
+            request.tell(forward if self.forward_refused else one.reverse(self.stage, one.inputs, saved))
+        )
+
+    def reaches(self, found: Outputs) -> bool:
+        """Whether each output by which a number is fitted differs from the definition's; without any, a refused one."""
+        one = self.cases[0]
+        names = self.fitted or one.refused
+        moved = (name in found and not np.array_equal(found[name], one.right[name]) for name in names)
+        return all(moved) if self.fitted else any(moved)
 
     def moves(self, found: Outputs) -> bool:
         """Whether these outputs of the first case differ from the definition's."""
