@@ -39,7 +39,8 @@ def run_write(options: argparse.Namespace) -> int:
     folder = golden_folder(options.golden)
     lines = write(folder, options.families)
     print("\n".join(lines) or "no expected value moved")
-    print(f"golden: written, {len(lines)} changes; if values moved, raise {folder / 'VERSION'}", file=sys.stderr)
+    remedy = f"; raise {folder / 'VERSION'}, if this change has not raised it yet" if lines else ""
+    print(f"golden: written, {len(lines)} changes{remedy}", file=sys.stderr)
     return 1
 
 

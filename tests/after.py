@@ -3,15 +3,17 @@
 Compares the working tree with REVISION (the last commit by default; with a clean tree, the commit before it), and
 prints the commands in order: lint, types of the changed files, the golden cases to make again, the lists that have to
 name a new component, the other programs whose output depends on the change, the tests of names, words and generated
-tables, the tests of the rooms that it touches, and all other tests that import a changed module, which take longest.
+tables, the mistakes of a changed table, which the judge has to refuse and to name, the tests of the rooms that it
+touches, and all other tests that import a changed module, which take longest.
 `--run` runs them and stops at the first that fails. It leaves out `golden/make.py write`, because no run of tests
-rewrites its expected values: run that command first.
+rewrites its expected values, and says so in its first lines: run that command before.
 """
 
 import argparse
 import ast
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -31,6 +33,7 @@ LISTS = (
 )
 LISTED = ("golden/", *(f"{PACKAGE}{room}" for room in ("config.py", "definition/", "method/", "port/", "training/")))
 WRITE = "python golden/make.py write"
+MISTAKE = "tests/port/vectors/test_wrong_ports.py::test_a_wrong_port_is_refused_and_named"
 # Beginning of a changed path -> commands whose output depends on it.
 CONSTANTS, INVENTORIES = "python tests/port/unseen/by_hand/constants.py", "python docs/make.py recordings.inventories"
 OPERATIONS = "python docs/make.py ports.operations"
@@ -112,6 +115,14 @@ def makers(paths: list[str]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
+def mistakes(paths: list[str]) -> list[str]:
+    """The slow test of every mistake of the changed tables: the judge refuses it, and names it."""
+    tables = [path for path in paths if path.startswith("golden/makers/") and path.endswith(".toml")]
+    entries = [tomllib.loads((ROOT / path).read_text(encoding="utf-8")) for path in tables]
+    tests = [f"{MISTAKE}[{flag}]" for table in entries for flag, entry in table.items() if isinstance(entry, dict)]
+    return [f"pytest -q -m slow -n 0 {' '.join(tests)}"] if tests else []
+
+
 def tests_of(path: str) -> list[str]:
     """Tests of a path: the file itself, the folder of its room, and what `MORE` names."""
     if path.startswith("tests/") and Path(path).name.startswith("test_"):
@@ -166,6 +177,7 @@ def commands(paths: list[str]) -> list[str]:
         *([f"pytest -q -n 0 {' '.join(LISTS)}"] if any(path.startswith(LISTED) for path in paths) else []),
         *(name for name in programs if name not in written),
         f"pytest -q -n 0 {' '.join(ALWAYS)}",
+        *mistakes(paths),
         *tested(paths),
     ]
 
@@ -180,10 +192,13 @@ def main(words: list[str]) -> int:
         paths = changed(given.revision)
     except subprocess.CalledProcessError as error:
         parser.error(error.stderr.strip() or f"git ended with code {error.returncode}")
-    for command in commands(paths):
-        left_out = given.run and command.startswith(WRITE)
-        print(f"{command}  (left out: run it first)" if left_out else command, flush=True)
-        if given.run and not left_out:
+    found = commands(paths)
+    left_out = [command for command in found if given.run and command.startswith(WRITE)]
+    for command in left_out:
+        print(f"{command}  (left out: run it first)", flush=True)
+    for command in (command for command in found if command not in left_out):
+        print(command, flush=True)
+        if given.run:
             code = subprocess.run(command.split(), cwd=ROOT, check=False).returncode
             if code:
                 return code

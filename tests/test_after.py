@@ -23,6 +23,15 @@ def test_lists_that_lack_a_new_component_come_before_the_programs_but_after_the_
         assert f"def {test}" in (after.ROOT / path).read_text(encoding="utf-8")
 
 
+def test_a_table_of_mistakes_reaches_the_slow_test_of_each_of_them():
+    (found,) = after.mistakes(["golden/makers/smoothness.toml", "golden/makers/smoothness.py", "README.md"])
+    assert f"{after.MISTAKE}[edges_ignored]" in found.split() and "[module]" not in found
+    assert found.split().count("slow") == 1 and found in after.commands(["golden/makers/smoothness.toml"])
+    path, _, test = after.MISTAKE.partition("::")
+    assert f"def {test}" in (after.ROOT / path).read_text(encoding="utf-8")
+    assert after.mistakes(["golden/makers/smoothness.py"]) == []
+
+
 def test_a_record_reaches_the_pages_that_read_it():
     assert after.makers(["docs/results/levers.json"]) == ["python docs/make.py full_size.levers"]
     assert "python docs/make.py book.chapters" in after.makers(["notebooks/04_deformation.py"])
@@ -62,8 +71,8 @@ def test_a_clean_tree_is_told(revision, edited, base, told, monkeypatch, capsys)
 def test_golden_cases_that_a_run_leaves_out_are_said_to_be_left_out(monkeypatch, capsys):
     monkeypatch.setattr(after, "changed", lambda revision: ["golden/makers/depth.toml"])
     monkeypatch.setattr(after.subprocess, "run", lambda words, **_: after.subprocess.CompletedProcess(words, 1))
-    monkeypatch.setattr(after, "commands", lambda paths: [f"{after.WRITE} depth", "ruff check"])
-    assert after.main(["--run"]) == 1
+    monkeypatch.setattr(after, "commands", lambda paths: ["ruff check", f"{after.WRITE} depth"])
+    assert after.main(["--run"]) == 1  # said before the first command, which may fail
     assert capsys.readouterr().out.splitlines() == [f"{after.WRITE} depth  (left out: run it first)", "ruff check"]
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from numpy.typing import NDArray
 
+from endotsr.errors import InputError
 from endotsr.method.splatting.render import Compositor
 from endotsr.port.judge.compare import distances, fingerprint, largest, misses
 from endotsr.port.judge.format import FLIP_BUDGET, Array, Because, Case, Mistake, Output, Rule, Shown, Truth
@@ -53,7 +54,7 @@ def solve(spec: Spec, operation: Stage, wrong: Mapping[str, Wrong] | None) -> So
     """A case with its answers.
 
     wrong    answers of wrong ports, by flag; None omits the mistakes
-    Raises:  ValueError if the case does not reveal a mistake listed in its flags.
+    Raises:  InputError if the case does not reveal a mistake listed in its flags.
     """
     inputs = stored_inputs(spec)
     runs = [reference(operation, inputs, s, "float64", "definition") for s in (spec.settings, *spec.either)]
@@ -195,10 +196,22 @@ def _mistakes(
             found[flag] = Mistake(shows=shows, rounding=True, shows_float32=single)
         else:
             found[flag] = Mistake(shows=shows)
-    missing = [flag for flag in spec.flags if flag not in found or not _detected(found[flag], rules)]
-    if missing:
-        raise ValueError(f"{spec.name}: does not show {', '.join(missing)}")
+    _check_flags(spec, found, rules)
     return _without_shared_integers(found, rules)
+
+
+def _check_flags(spec: Spec, found: Mapping[str, Mistake], rules: dict[str, Rule]) -> None:
+    """Raises InputError for a flag of the case whose mistake is not examined on it, or is not far beyond tolerance."""
+    if absent := [flag for flag in spec.flags if flag not in found]:
+        raise InputError(
+            f"{spec.name}: not examined: {', '.join(absent)}; allowed in flags: an entry of golden/makers/*.toml whose"
+            f" `operations` name {spec.operation}"
+        )
+    if small := [flag for flag in spec.flags if not _detected(found[flag], rules)]:
+        raise InputError(
+            f"{spec.name}: does not show {', '.join(small)}: with the changed lines no output differs by {MARGIN:g}"
+            " float32 tolerances or more; choose inputs on which it does, or leave out the flag"
+        )
 
 
 def _detected(mistake: Mistake, rules: dict[str, Rule]) -> bool:

@@ -24,6 +24,7 @@ from endotsr.port.stages.requests import raster_of
 from makers import generate
 from makers.generate import all_specs, check, moved, solve_all, solve_these
 from makers.making import single
+from makers.registry import all_wrong_ports
 from makers.solve import MARGIN
 
 FOLDER = golden_folder()
@@ -238,6 +239,18 @@ def test_regeneration_says_what_moved(copy):
     path.write_bytes(npy_bytes(one.expected[0]["translation"] * 1.001))
     (line,) = moved(copy, one)
     assert line.startswith("motion/generic/translation: ") and "e-0" in line and "tolerance" not in line
+
+
+@pytest.mark.parametrize(("flag", "said"), [
+    ("motion_cosines_dropped", "not examined: motion_cosines_dropped; .* whose `operations` name masked_l1"),
+    ("sign_of_zero", "does not show sign_of_zero: .*; choose inputs on which it does, or leave out the flag"),
+])  # fmt: skip
+def test_a_flag_whose_mistake_a_case_does_not_show_is_named_with_the_reason(flag, said):
+    """A mistake that another table declares is not examined until it names the operation."""
+    (spec,) = [spec for spec in all_specs() if spec.name == "masked_l1/generic"]
+    wrong_ports = [port for name, port in all_wrong_ports().items() if name in (*spec.flags, flag)]
+    with pytest.raises(InputError, match=f"masked_l1/generic: {said}"):
+        solve_these([spec._replace(flags=(*spec.flags, flag))], wrong_ports)
 
 
 def test_one_family_is_written_alone_and_other_bits_are_not_noise(copy):
