@@ -55,7 +55,9 @@ NO_LINE = {
 @pytest.mark.parametrize("chapter", DERIVED)
 def test_steps_are_numbered_without_gaps(chapter):
     steps = [(int(a), int(b)) for a, b in STEP.findall(NOTEBOOKS[chapter])]
-    assert steps == [(chapter, k) for k in range(1, len(steps) + 1)] and len(steps) >= 6
+    wrong = [place for k, place in enumerate(steps, start=1) if place != (chapter, k)]
+    assert not wrong, f"({chapter}.{wrong[0][1]}) is out of order: number the steps in the order of the text"
+    assert len(steps) >= 6
 
 
 def test_only_derivations_have_numbers():
