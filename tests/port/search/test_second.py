@@ -220,6 +220,17 @@ def test_a_mistake_of_each_pass_is_said_with_the_other(golden, tmp_path, edits, 
         assert whole == f"  (together every output of its {len(found.cases)} cases)"
 
 
+def test_a_mistake_of_each_pass_is_said_though_a_decision_is_wrong_too(golden, tmp_path):
+    """A dead atom is one by its RMS, which the first mistake changes."""
+    edits = [
+        ("np.sqrt(((phi - mean) ** 2).mean(0))", "np.sqrt((phi**2).mean(0))"),
+        ('i["d_phi_bar"] / divisor', '-i["d_phi_bar"] / divisor'),
+    ]
+    found = search_on(golden, tmp_path, "atoms", *edits)
+    assert found.discrete
+    assert "with two changes: `atoms` where `atoms - mean` is right" in together(found, SECONDS)[0]
+
+
 def test_none_of_them_is_in_the_independent_set():
     theirs = [hand_port.sources(entry["edit"]) for entry in measure.mistakes()]
     assert not any(hand_port.sources([(old, new)]) in theirs for _, old, new, _ in MISTAKES.values())

@@ -53,10 +53,10 @@ def together(trial: Trial, seconds: float) -> list[str]:
     The second one is searched for in the definition with the first one.
     """
     first = trial.hits[0] if trial.hits else None
-    if first is None or first.standing is None or trial.length or trial.discrete:
+    if first is None or first.standing is None or trial.length:
         return []
-    if first.whole not in ("forward", "most"):
-        return []
+    if first.whole != "forward" and (first.whole != "most" or trial.discrete):
+        return []  # many changes give the decisions of the one case that is left
     with first.standing():
         beside = sorted((one.beside(trial.stage) for one in trial.cases), key=_order)
         second = search(trial.stage, beside, trial.golden, seconds) if beside[0].refused else None
