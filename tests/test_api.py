@@ -39,7 +39,7 @@ def sequence():
 
 
 def test_settings_of_the_simulator_are_refused_for_a_folder(tmp_path):
-    with pytest.raises(endotsr.InputError, match=r"simulator with the folder .* is not allowed; allowed: 'simulated'"):
+    with pytest.raises(endotsr.InputError, match=r"simulator with the folder .* is not allowed; use 'simulated'"):
         endotsr.load_sequence(tmp_path, simulator=SIMULATOR)
 
 
@@ -101,7 +101,7 @@ def test_settings_are_those_of_the_command_line(tmp_path):
     [
         ({"preset": "papper"}, "paper, sharp, quick, demo"),
         ({"modell": {}}, "unknown key modell"),
-        ({"model": {"basis": "cubic"}}, "quartic, gaussian"),
+        ({"model": {"basis": "cubic"}}, "quartic or gaussian"),
         ({"model": {"base": 3}}, "unknown key model.base"),
         ({"model": 3}, "model = 3 is not allowed"),
         ({"iterations": 0}, "an integer >= 1"),
@@ -330,7 +330,7 @@ def test_film_view_and_export_are_those_of_the_commands(run, tmp_path):
         run.film(tmp_path / "a.avi")
     place = {"rotation": np.eye(3).tolist(), "translation": [0, 0, 0]}
     (tmp_path / "path.json").write_text(json.dumps({"cameras": [place, {**place, "width": 20}]}))
-    with pytest.raises(endotsr.InputError, match="allowed: one size"):
+    with pytest.raises(endotsr.InputError, match="use one size"):
         run.film(tmp_path / "c.gif", count=2, camera=str(tmp_path / "path.json"))
 
 

@@ -51,7 +51,7 @@ def constraints(which: str) -> list[str]:
     for text in dependencies():
         bound = BOUND.match(text)
         if bound is None:
-            raise ValueError(f"pyproject.toml: {text!r} has no lower bound; allowed: name>=version")
+            raise ValueError(f"pyproject.toml: {text!r} has no lower bound; use name>=version")
         found.append(f"{bound[1]}=={bound[2]}.*")
     return found
 

@@ -105,13 +105,13 @@ def load_sequence(
     Raises: InputError naming the file, the frame or the key, and the allowed values.
     """
     if config is not None and preset is not None:
-        raise InputError(f"load_sequence: preset = {preset!r} with a config is not allowed; allowed: one of the two")
+        raise InputError(f"load_sequence: preset = {preset!r} with a config is not allowed; use one of the two")
     config = _changed(make_config(preset) if config is None else config, None, {"sequence": settings})
     wanted = dict(simulator or {})
     refuse_unknown_keys(wanted, SimulatorSettings, "simulator")
     shown = checked(wanted, SimulatorSettings, "simulator")
     if wanted and str(source) != sources.SIMULATED:
-        raise InputError(f"load_sequence: simulator with the folder {source} is not allowed; allowed: 'simulated'")
+        raise InputError(f"load_sequence: simulator with the folder {source} is not allowed; use 'simulated'")
     sequence = sources.load_sequence(str(source), config, shown)
     return replace(sequence, source=str(source), settings=config.sequence, simulator=shown)
 
@@ -152,11 +152,11 @@ def train(
     from endotsr.training.fitting.state import new_training
 
     if not isinstance(sequence, Sequence):
-        raise InputError(f"train: sequence is {type(sequence).__name__}; allowed: a Sequence, as from load_sequence")
+        raise InputError(f"train: sequence is {type(sequence).__name__}; use a Sequence, as from load_sequence")
     if config is None:
         config = make_config(preset, file=None, iterations=iterations, **sections)
     elif preset is not None:
-        raise InputError(f"train: preset = {preset!r} with a config is not allowed; allowed: one of the two")
+        raise InputError(f"train: preset = {preset!r} with a config is not allowed; use one of the two")
     else:
         config = _changed(config, iterations, sections)
     if sequence.settings is not None:
@@ -188,7 +188,7 @@ def _called_for(
 ) -> tuple[Config, RunRecord]:
     """The settings for the effects found in the clip, with verdicts and plan for the record; unchanged by default."""
     if effects not in ("everything", "auto"):
-        raise InputError(f"train: effects = {effects!r} is not allowed; allowed: everything, auto")
+        raise InputError(f"train: effects = {effects!r} is not allowed; use everything or auto")
     if effects == "everything":
         return config, {}
     from endotsr.clips.effects.auto import planned_settings
@@ -488,7 +488,7 @@ def _changed(config: Config, iterations: int | None, sections: Mapping[str, Mapp
     """The checked settings with the schedule stretched to `iterations` and the sections changed."""
     if iterations is not None:
         if isinstance(iterations, bool) or not isinstance(iterations, int) or iterations < 1:
-            raise InputError(f"iterations = {iterations!r} is not allowed; allowed: an integer >= 1")
+            raise InputError(f"iterations = {iterations!r} is not allowed; use an integer >= 1")
         config = with_iterations(config, iterations)
     changes = {name: dict(values) if isinstance(values, Mapping) else values for name, values in sections.items()}
     return config_from_dict(merged(msgspec.to_builtins(config), changes), "arguments")

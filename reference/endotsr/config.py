@@ -273,22 +273,19 @@ class Config(Section, frozen=True, kw_only=True):
         ):
             raise InputError(
                 f"{where}: model.frequency_max = {model.frequency_max:g} is not allowed; "
-                f"allowed: a number > model.frequency_min = {model.frequency_min:g}"
+                f"use a number > model.frequency_min = {model.frequency_min:g}"
             )
         if loss.laplacian_full < loss.laplacian_from:
             raise InputError(
                 f"{where}: loss.laplacian_full = {loss.laplacian_full} is not allowed; "
-                f"allowed: an integer >= loss.laplacian_from = {loss.laplacian_from}"
+                f"use an integer >= loss.laplacian_from = {loss.laplacian_from}"
             )
         self._refuse_empty(where)
         if not enclose_median(low, high):
-            raise InputError(
-                f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; allowed: {PERCENTILES}"
-            )
+            raise InputError(f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; use {PERCENTILES}")
         if self.training.seed > LARGEST_SEED:
             raise InputError(
-                f"{where}: training.seed = {self.training.seed} is not allowed; allowed: an integer from 0 to"
-                f" {LARGEST_SEED}"
+                f"{where}: training.seed = {self.training.seed} is not allowed; use an integer from 0 to {LARGEST_SEED}"
             )
 
     def _refuse_empty(self, where: str) -> None:
@@ -296,12 +293,12 @@ class Config(Section, frozen=True, kw_only=True):
         density, (cutoff, largest) = self.density, (self.raster.alpha_cutoff, self.raster.alpha_max)
         if NO_DENSIFICATION < density.until < density.start:
             raise InputError(
-                f"{where}: density.until = {density.until} is not allowed; allowed: an integer >= density.start ="
+                f"{where}: density.until = {density.until} is not allowed; use an integer >= density.start ="
                 f" {density.start}, or 0, with which no iteration densifies"
             )
         if isinstance(cutoff, float) and isinstance(largest, float) and largest < cutoff:
             raise InputError(
-                f"{where}: raster.alpha_max = {largest:g} is not allowed; allowed: a number >= raster.alpha_cutoff ="
+                f"{where}: raster.alpha_max = {largest:g} is not allowed; use a number >= raster.alpha_cutoff ="
                 f" {cutoff:g}, or nothing is drawn"
             )
 
@@ -403,7 +400,7 @@ def config_from_dict(data: Keys, where: str = "configuration") -> Config:
     """A strict `Config` from nested dictionaries over the preset named in data["preset"] (default `paper`)."""
     preset = data.get("preset", "paper")
     if not isinstance(preset, str) or preset not in PRESETS:
-        raise InputError(f"{where}: preset = {preset!r} is not allowed; allowed: {', '.join(PRESETS)}")
+        raise InputError(f"{where}: preset = {preset!r} is not allowed; use one of {', '.join(PRESETS)}")
     data = without_former_keys(data, where, PRESETS[preset].training.bridge_fraction)
     refuse_unknown_keys(data, Config, where)
     return checked(merged(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
@@ -447,7 +444,7 @@ def without_former_keys(data: Keys, where: str, bridge_fraction: float = 0.0) ->
             if values[key] not in allowed and not (unused and values[key] == "neighbour"):
                 raise InputError(
                     f"{where}: {section}.{key} = {values[key]!r} is not allowed: the key left with an earlier version; "
-                    f"allowed: {allowed[0]!r}, or no such key (runs with other values open only in that version)"
+                    f"use {allowed[0]!r}, or no such key (runs with other values open only in that version)"
                 )
             found += 1
     if found == sum(map(len, FORMER.values())) and "iterations" in data["training"]:

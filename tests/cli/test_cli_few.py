@@ -58,6 +58,6 @@ def test_a_clip_that_is_too_short_for_a_training_is_told_so_where_one_comes_next
 
 def test_pictures_that_are_too_small_for_a_training_are_named(tmp_path, capsys):
     lines = said(capsys, "prepare", scene(), "--out", tmp_path / "clip", "--crop", "0", "0", "40", "14").splitlines()
-    words = "images of 40x14 pixels; allowed: at least 16 on each side"
+    words = "images of 40x14 pixels; use at least 16 on each side"
     assert lines[-1] == f"no training: {words}; prepare larger ones"
     assert f"{words}; " in said(capsys, "check", tmp_path / "clip"), "as check says"

@@ -74,7 +74,7 @@ def test_results_of_sequences(tmp_path):
     [
         ("a.html", ["--times", "0.5"], "the format page with --times: a page contains all times"),
         ("a.html", ["--content", "mesh"], "the format page with --content: a page contains all times"),
-        ("a.html", ["--keys", "1"], "--keys 1 is not allowed; allowed: an integer from 2"),
+        ("a.html", ["--keys", "1"], "--keys 1 is not allowed; use an integer from 2"),
         ("a.ply", ["--keys", "9"], "--keys has no effect without the format page"),
         ("a.ply", ["--title", "mine"], "--title has no effect without the format page"),
         ("a.ply", ["--sequence", "elsewhere"], "--sequence has no effect without the format page"),

@@ -40,5 +40,5 @@ def test_the_flows_of_clips_are_shown_and_removed(home, capsys):
 
 
 def test_another_word_is_refused(home, capsys):
-    assert_refused(capsys, ["--cache", "all"], "--cache 'all' is not allowed; allowed: --cache alone, or --cache clear")
+    assert_refused(capsys, ["--cache", "all"], "--cache 'all' is not allowed; use --cache alone, or --cache clear")
     assert len(list((home / "kernels").iterdir())) == 2

@@ -188,7 +188,7 @@ def test_a_script_names_every_command_and_its_options(shell, capsys):
         for word in words_of(name):
             assert word.removeprefix("--") in script
     assert "model.bases" in script and "--film" in words_of("render")
-    assert_refused(capsys, ["--completion", "tcsh"], "'tcsh' is not allowed; allowed: bash, zsh, fish")
+    assert_refused(capsys, ["--completion", "tcsh"], "'tcsh' is not allowed; use one of bash, zsh, fish")
 
 
 @pytest.mark.parametrize(

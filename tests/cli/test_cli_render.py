@@ -73,7 +73,7 @@ def test_a_film_of_cameras_of_several_sizes_is_refused(film, finished_run, tmp_p
     (tmp_path / "path.json").write_text(json.dumps({"cameras": cameras}))
     words = ["render", str(finished_run), "--count", "3", "--camera", str(tmp_path / "path.json")]
     assert main([*words, "--film", str(tmp_path / film)]) == 2
-    assert "views of 48x32, 20x32; allowed: one size" in capsys.readouterr().err
+    assert "views of 48x32, 20x32; use one size" in capsys.readouterr().err
     assert main([*words, "--film", str(tmp_path / film), "--size", "24x16"]) == 0
     assert main([*words, "--out", str(tmp_path / "b")]) == 0
 
@@ -118,18 +118,18 @@ def test_a_film_in_slow_motion(run_copy, tmp_path, capsys):
             "film.mp4: --out is a folder of pictures, but this is the name of a .mp4 file; --film",
         ),
         (["--out", "{}/a.png"], "the name of a .png file"),
-        (["--film", "{}/a.avi"], "a.avi: not a film; allowed: a name that ends in .mp4, .webm, .gif"),
+        (["--film", "{}/a.avi"], "a.avi: not a film; use a name that ends in .mp4, .webm, .gif"),
         (["--film", "{}/none/a.mp4"], "a.mp4: cannot be written"),
         (["--film", "{}/a.mp4", "--rate", "0"], "--rate 0 is not allowed"),
         (["--film", "{}/a.mp4", "--panels"], "--panels: missing value {render,truth,error,depth,opacity} ..."),
         (["--film", "{}/a.mp4", "--panels", "truth", "--count", "5"], "--panels truth at time 0.25: no frame has"),
         (["--film", "{}/a.mp4", "--panels", "error", "--offset", "1", "0", "0"], "--panels error at time 0:"),
-        (["--out", "{}/a", "--camera", "circle"], "--camera 'circle' is not allowed; allowed: observed, orbit, sway"),
+        (["--out", "{}/a", "--camera", "circle"], "--camera 'circle' is not allowed; use observed, orbit, sway"),
         (["--out", "{}/a", "--camera", "{}/no.json"], "no.json: cannot be read"),
-        (["--out", "{}/a", "--camera", "-1"], "--camera -1 is not allowed; allowed: a frame from 0 to 8"),
-        (["--out", "{}/a", "--camera=--5"], "--camera '--5' is not allowed; allowed: observed, orbit, sway"),
-        (["--out", "{}/a", "--size", "12"], "--size '12' is not allowed; allowed: WIDTHxHEIGHT"),
-        (["--out", "{}/a", "--size", "0x9"], "allowed: an integer from 1 to 16384"),
+        (["--out", "{}/a", "--camera", "-1"], "--camera -1 is not allowed; use a frame from 0 to 8"),
+        (["--out", "{}/a", "--camera=--5"], "--camera '--5' is not allowed; use observed, orbit, sway"),
+        (["--out", "{}/a", "--size", "12"], "--size '12' is not allowed; use WIDTHxHEIGHT"),
+        (["--out", "{}/a", "--size", "0x9"], "use an integer from 1 to 16384"),
         (["--out", "{}/a", "--camera", "orbit", "--angle", "90"], "--angle 90 is not allowed"),
         (["--out", "{}/a", "--offset", "nan", "0", "0"], "--offset is not allowed"),
     ],
@@ -146,7 +146,7 @@ def test_a_run_without_held_out_frames_names_the_other_choices(words, run_copy, 
     record = json.loads(file.read_text(encoding="utf-8"))
     file.write_text(json.dumps(record | {"test_index": []}), encoding="utf-8")
     words = [word.format(tmp_path) for word in words]
-    assert_refused(capsys, ["render", str(run_copy), *words], "render: no frame is held out; allowed: --frames train")
+    assert_refused(capsys, ["render", str(run_copy), *words], "render: no frame is held out; use --frames train")
     assert not (tmp_path / "a").exists()
 
 

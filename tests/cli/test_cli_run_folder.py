@@ -160,7 +160,7 @@ def test_machine_and_versions_say_something():
         ('{"input": 3}', "input"),
         ('{"input": {"source": "simulated"}}', "input.arrays_sha256 is missing"),
         ('{"input": {"source": "x", "arrays_sha256": {}, "simulator": {"width": "x"}}}', "input.simulator.width = 'x'"),
-        ("[]", "holds list; allowed: an object"),
+        ("[]", "holds list; use an object"),
     ],
 )
 def test_run_json_without_its_keys_is_one_line(text, said, run_copy, capsys):

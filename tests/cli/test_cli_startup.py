@@ -59,7 +59,7 @@ def test_a_command_that_has_moved_names_its_new_place(former, capsys):
      ("xyz", "")],
 )  # fmt: skip
 def test_an_unknown_command_is_answered_with_the_similar_one(typed, said, capsys):
-    assert_refused(capsys, [typed], f"unknown command {typed!r};{said} allowed: demo, prepare")
+    assert_refused(capsys, [typed], f"unknown command {typed!r};{said} use one of demo, prepare")
 
 
 def test_a_positional_argument_with_a_dot_is_no_section(capsys):

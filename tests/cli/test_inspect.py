@@ -47,7 +47,7 @@ def test_inspect_describes_a_folder_once_and_names_what_nothing_reads(capsys, tm
         (["inspect", "simulated", "--frame-rate", "fast"], ("--frame-rate", "fast")),
         (["inspect", "simulated", "--out", "no_such_folder/page.html"], ("no_such_folder",)),
         (["inspect", "simulated", "--model.bases", "0"], ("model.bases",)),
-        (["train", "simulated", "--out", "run", "--effects", "some"], ("--effects", "everything, auto")),
+        (["train", "simulated", "--out", "run", "--effects", "some"], ("--effects", "everything or auto")),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(capsys, tmp_path, monkeypatch, words, named):

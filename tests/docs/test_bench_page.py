@@ -57,7 +57,7 @@ def test_every_table_of_times_names_its_machine_and_day(found):
 def test_a_mark_without_a_meaning_and_a_missing_result_are_named(found, tmp_path):
     page = tmp_path / "page.md"
     page.write_text("<!-- bench:colour:start -->\n<!-- bench:colour:end -->")
-    with pytest.raises(InputError, match=r"page\.md: mark bench:colour has no end or no meaning; allowed: machine,"):
+    with pytest.raises(InputError, match=r"page\.md: mark bench:colour has no end or no meaning; use one of machine,"):
         write_marked(page, bench.fragments(found, {}), "bench")
     with pytest.raises(InputError, match=r"bench_stages\.json: cannot be read.*make\.py bench measure"):
         bench.read(tmp_path)

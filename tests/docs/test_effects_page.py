@@ -53,7 +53,7 @@ def test_unknown_words_and_missing_results_are_refused(tmp_path):
         effects.PROGRAM.run(["paint"])
     with pytest.raises(InputError, match="made by"):
         effects.read(tmp_path)
-    with pytest.raises(SystemExit, match="scene 'nowhere' is not allowed; allowed: still, breathing"):
+    with pytest.raises(SystemExit, match="scene 'nowhere' is not allowed; use one of still, breathing"):
         effects.PROGRAM.run(["measure", "train", "nowhere"])
 
 

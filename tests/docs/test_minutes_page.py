@@ -29,5 +29,5 @@ def test_row_is_the_mean_of_its_runs_and_the_time_that_of_the_iterations(tmp_pat
     assert "| `sharp` | 1 | 1.5 | 2 | 5 | 1.0 | 31.00 | 0.9000 | 0.1000 |" in minutes.table(result)
     record.write_text(json.dumps(result))
     assert "/somewhere" not in record.read_text()
-    with pytest.raises(InputError, match="allowed: the clip of the other rows"):
+    with pytest.raises(InputError, match="use the clip of the other rows"):
         measured("other", run(tmp_path / "c", "other", 30.0))

@@ -178,7 +178,7 @@ VALUES = {
     "NaN statistics": (put("statistics.gradient_sum", 0, np.nan), "gradient_sum"),
     "visits in float": (cast("statistics.visits", np.float64), "int64 visits"),
     "other precision": (cast("gaussians.harmonics", np.float64), "the same in every array"),
-    "half precision": (cast("gaussians.position", np.float16), "allowed: float32 or float64"),
+    "half precision": (cast("gaussians.position", np.float16), "use float32 or float64"),
     "integer moments": (cast("second.log_scale", np.int32), "second log_scale"),
     "negative iteration": (lambda entries, header: header.update(iteration=-1), "iteration is no number of iterations"),
     "true iteration": (lambda entries, header: header.update(iteration=True), "int expected"),

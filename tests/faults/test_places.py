@@ -35,7 +35,7 @@ def test_a_run_that_cannot_be_written_is_not_resumed(run, capsys, monkeypatch):
     """The lock of the run was named, after the sequence was read."""
     monkeypatch.setattr("os.access", lambda path, mode: mode & os.W_OK == 0 or run not in (path, *path.parents))
     monkeypatch.setattr(sources, "load_sequence", never)
-    said = f"{run}: cannot be written: no permission; allowed: a folder that can be, such as a copy"
+    said = f"{run}: cannot be written: no permission; use a folder that can be, such as a copy"
     assert_refused(capsys, ["train", "--out", str(run), "--resume", "--iterations", "90"], said)
 
 

@@ -58,7 +58,7 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
     clip = {"name": Path(source["source"]).name, "frames": source["frames"], "size": size}
     known = loaded(options.record) if options.record.exists() else {"clip": clip, "rows": {}}
     if known["clip"] != clip:
-        raise InputError(f"{options.runs[0]}: its clip is {clip}; allowed: the clip of the other rows, {known['clip']}")
+        raise InputError(f"{options.runs[0]}: its clip is {clip}; use the clip of the other rows, {known['clip']}")
     known["rows"][options.name] = [run_row(folder) for folder in options.runs]
     known["baselines"] = {
         label: {key: metrics["baselines"][baseline]["mean"][key] for key in METRICS}

@@ -64,7 +64,7 @@ def run_all(out: Path, names: tuple[str, ...], scenes: tuple[Path, ...], say: Sa
     Raises: InputError before anything is measured, if a name is unknown or a file of `scenes` is no trained scene.
     """
     if unknown := [name for name in names if name not in FILES]:
-        raise InputError(f"bench: {unknown[0]!r} is not allowed; allowed: {', '.join(FILES)}")
+        raise InputError(f"bench: {unknown[0]!r} is not allowed; use one of {', '.join(FILES)}")
     for path in scenes:
         read_arrays(path)
     out.mkdir(parents=True, exist_ok=True)

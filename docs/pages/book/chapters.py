@@ -77,7 +77,7 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
     numbers = options.numbers
     files = {file.name[:2]: file for file in sorted(NOTEBOOKS.glob("[0-9]*.py"))}
     if not {*numbers} <= {*files}:
-        raise InputError(f"no notebook {sorted({*numbers} - {*files})}; allowed: {', '.join(files)}")
+        raise InputError(f"no notebook {sorted({*numbers} - {*files})}; use one of {', '.join(files)}")
     environment = os.environ | {"ENDOTSR_NOTEBOOK_SIZE": "small", "MPLBACKEND": "Agg", "NUMBA_NUM_THREADS": "1"}
     found = loaded(options.record)["chapters"] if numbers else {}
     for file in (files[number] for number in numbers or files):

@@ -43,7 +43,7 @@ def of_run(folder: Path) -> tuple[str, dict[str, Any], dict[str, NDArray[np.uint
     """Name, numbers and pictures {file stem: picture} of one finished run."""
     run = endotsr.open_run(folder)
     if not isinstance(run, endotsr.Run):
-        raise InputError(f"{folder}: a recording in windows; allowed: one run")
+        raise InputError(f"{folder}: a recording in windows; use one run")
     sequence, settings = run.sequence, msgspec.to_builtins(run.config)
     sigma = noise_of(Path(run.record["input"]["source"]), settings["sequence"]["scale"])
     predict = predictions(run)
@@ -95,7 +95,7 @@ def noise_of(clip: Path, scale: float) -> float:
     """
     truth = clip / "truth" / "light.npz"
     if not truth.is_file() or scale != 1:
-        raise InputError(f"{clip}: not a simulated clip at full size; allowed: the folder of `endotsr simulate`")
+        raise InputError(f"{clip}: not a simulated clip at full size; use the folder of `endotsr simulate`")
     with np.load(truth) as light:
         return float(np.hypot(light["noise_sigma"], 1 / (255 * np.sqrt(12))))
 

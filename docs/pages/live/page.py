@@ -90,7 +90,7 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
     """
     chapters = options.chapters
     if wrong := sorted({*chapters} - {*CHAPTERS}):
-        raise InputError(f"{', '.join(wrong)}: runs in no page; allowed: {', '.join(CHAPTERS)}")
+        raise InputError(f"{', '.join(wrong)}: runs in no page; use one of {', '.join(CHAPTERS)}")
     found = loaded(options.record)["chapters"] if chapters else {}
     for name in chapters or CHAPTERS:
         with tempfile.TemporaryDirectory() as scratch:

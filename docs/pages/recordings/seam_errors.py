@@ -44,9 +44,7 @@ def seam_errors(
         if end - begin >= STEP:
             inside += _lengths(scene, masks, positions, (begin + end - STEP) // 2)
     if not across or not inside:
-        raise InputError(
-            f"{scene.run}: no two windows share a frame, or they are too short; allowed: windows with seams"
-        )
+        raise InputError(f"{scene.run}: no two windows share a frame, or they are too short; use windows with seams")
     (error, motion), (error_inside, motion_inside) = (np.mean(found, axis=0) for found in (across, inside))
     return SeamErrors(float(error), float(motion), float(error_inside), float(motion_inside), len(across))
 

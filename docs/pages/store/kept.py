@@ -124,9 +124,9 @@ def _read(path: Path, about: dict[str, Any]) -> dict[str, dict[str, Any]]:
         first, *lines = [json.loads(line) for line in whole.splitlines()] or [None]
         answers = {line["key"]: line["answer"] for line in lines}
     except (ValueError, TypeError, KeyError):
-        raise InputError(f"{path}: damaged; allowed: the answers of this command, or no file") from None
+        raise InputError(f"{path}: damaged; use the answers of this command, or no file") from None
     if first != about:
-        raise InputError(f"{path}: belongs to another measurement: {first}; allowed: {about}, or no file")
+        raise InputError(f"{path}: belongs to another measurement: {first}; use {about}, or no file")
     if whole != text:
         path.write_text(whole, encoding="utf-8")
     return answers

@@ -30,7 +30,7 @@ TRAINING = "training.json"  # in the folder of the measurement
 def run(o: argparse.Namespace) -> Path:
     """The study, printed as a table. Returns: its file. Raises: InputError."""
     if not o.minutes > 0 or (o.iterations is not None and o.iterations < 1):
-        raise InputError("tradeoff.train: allowed: --minutes > 0, --iterations >= 1")
+        raise InputError("tradeoff.train: use --minutes > 0, --iterations >= 1")
     use_threads(o.threads)
     name = o.sequence if o.sequence == SIMULATED else Path(o.sequence).resolve().name
     out = o.out or DOCS / "_build" / "tradeoff" / name

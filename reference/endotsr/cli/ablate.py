@@ -115,13 +115,15 @@ def spec_data(options: AblateOptions) -> Keys:
     from endotsr.studies.sweeps.ablation import CONFIGURATIONS, ablation_spec
 
     if options.seeds < 1:
-        raise InputError(f"ablate: --seeds {options.seeds} is not allowed; allowed: an integer >= 1")
+        raise InputError(f"ablate: --seeds {options.seeds} is not allowed; use an integer >= 1")
     for name in options.configurations:
         if name not in CONFIGURATIONS:
-            raise InputError(f"ablate: --configurations {name!r} is not allowed; allowed: {', '.join(CONFIGURATIONS)}")
+            raise InputError(
+                f"ablate: --configurations {name!r} is not allowed; use one of {', '.join(CONFIGURATIONS)}"
+            )
     length = PRESETS[options.preset].training.iterations if options.iterations is None else options.iterations
     if length < 2:
-        raise InputError(f"ablate: --iterations {length} is not allowed; allowed: an integer >= 2")
+        raise InputError(f"ablate: --iterations {length} is not allowed; use an integer >= 2")
     activation = with_iterations(PRESETS[options.preset], length).training.residual_activation
     keys: Keys = {"preset": options.preset, "splits": list(options.splits)}
     if options.iterations is not None:

@@ -61,11 +61,9 @@ def _refuse(options: BenchOptions) -> None:
         values = getattr(options, name)
         for value in values if isinstance(values, tuple) else (values,):
             if value < least:
-                raise InputError(f"bench: --{name} {value} is not allowed; allowed: an integer >= {least}")
+                raise InputError(f"bench: --{name} {value} is not allowed; use an integer >= {least}")
     if not options.gaussians and not options.scenes:
-        raise InputError(
-            "bench: --gaussians is empty and there are no --scenes; allowed: one or more numbers, or --scenes"
-        )
+        raise InputError("bench: --gaussians is empty and there are no --scenes; use one or more numbers, or --scenes")
 
 
 def cases_of(options: BenchOptions) -> list[BenchCase]:

@@ -61,7 +61,7 @@ def run(words: list[str]) -> int:
     """The command."""
     options = parse(DepthOptions, words, "depth")
     if not 0 < options.unit_scale < float("inf"):
-        raise InputError(f"--unit-scale {options.unit_scale:g} is not allowed; allowed: a number > 0")
+        raise InputError(f"--unit-scale {options.unit_scale:g} is not allowed; use a number > 0")
     _check_ratio(options)
     from endotsr.cli.parts.next_step import training_step
     from endotsr.clips.sequences.checks.kinds import KINDS
@@ -125,7 +125,7 @@ def _check_ratio(options: DepthOptions) -> None:
     """Raises InputError for an invalid ratio of depths."""
     if not 1 < options.farthest_over_nearest <= LARGEST_RATIO:
         raise InputError(
-            f"--farthest-over-nearest {options.farthest_over_nearest:g} is not allowed; allowed: a number over 1 to"
+            f"--farthest-over-nearest {options.farthest_over_nearest:g} is not allowed; use a number over 1 to"
             f" {LARGEST_RATIO:g}"
         )
 

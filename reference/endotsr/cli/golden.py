@@ -115,7 +115,7 @@ def run(words: list[str]) -> int:
         print("\n`endotsr golden SUBCOMMAND --help` lists the options of a subcommand.")
         return 0
     if words[0] not in SUBCOMMANDS:
-        raise InputError(f"unknown subcommand golden {words[0]!r}; allowed: {', '.join(SUBCOMMANDS)}")
+        raise InputError(f"unknown subcommand golden {words[0]!r}; use one of {', '.join(SUBCOMMANDS)}")
     return globals()[f"_{words[0]}"](words[1:])
 
 

@@ -145,7 +145,7 @@ def _command(name: str):
         import difflib
 
         meant = "".join(f"did you mean {word}? " for word in difflib.get_close_matches(name, COMMANDS, n=1))
-        raise InputError(f"unknown command {name!r}; {meant}allowed: {', '.join(COMMANDS)}")
+        raise InputError(f"unknown command {name!r}; {meant}use one of {', '.join(COMMANDS)}")
     return importlib.import_module(f"endotsr.cli.{name}").run
 
 
@@ -155,7 +155,7 @@ def _completion(words: list[str]) -> str:
 
     shell = "".join([words[0].partition("=")[2], *words[1:]])
     if shell not in SCRIPTS:
-        raise InputError(f"--completion {shell!r} is not allowed; allowed: {', '.join(SCRIPTS)}")
+        raise InputError(f"--completion {shell!r} is not allowed; use one of {', '.join(SCRIPTS)}")
     return SCRIPTS[shell]()
 
 

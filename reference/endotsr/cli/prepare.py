@@ -193,9 +193,9 @@ def _check_numbers(options: PrepareOptions) -> None:
     for name in ("rate", "source_rate", "baseline", "depth_scale"):
         value = getattr(options, name)
         if value is not None and not 0 < value < float("inf"):
-            raise InputError(f"--{name.replace('_', '-')} {value:g} is not allowed; allowed: a number > 0")
+            raise InputError(f"--{name.replace('_', '-')} {value:g} is not allowed; use a number > 0")
     if len(options.camera) not in (0, 4):
-        raise InputError(f"--camera: {len(options.camera)} numbers; allowed: 4, FX FY CX CY")
+        raise InputError(f"--camera: {len(options.camera)} numbers; use 4, FX FY CX CY")
 
 
 def _stated(options: PrepareOptions) -> "SourceOptions":

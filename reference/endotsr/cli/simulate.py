@@ -54,7 +54,7 @@ def run(words: list[str]) -> int:
     if options.out is None:
         raise InputError("simulate: --out FOLDER is missing: the sequence folder to create")
     if not options.scene and options.effects is None:
-        raise InputError(f"simulate: SCENE is missing; allowed: {', '.join(SCENES)}, or --effects NAME,..")
+        raise InputError(f"simulate: SCENE is missing; use one of {', '.join(SCENES)}, or --effects NAME,..")
     base = named_scene(options.scene) if options.scene else STILL
     base = base if options.effects is None else scene_of(options.effects)
     settings = parse(SimulateOptions, words, "simulate", SimulateOptions(settings=base)).settings

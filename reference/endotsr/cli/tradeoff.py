@@ -69,9 +69,9 @@ def _refuse(options: TradeoffOptions, given: frozenset[str], measured: bool) -> 
     """Raises InputError for options without effect, a wrong scale, and a measurement that would be replaced."""
     if options.run is not None and is_windowed(options.run):
         one = options.run / FOLDER / "000"
-        raise InputError(f"{options.run}: is a run of windows, each with its scene; allowed: a window, such as {one}")
+        raise InputError(f"{options.run}: is a run of windows, each with its scene; use a window, such as {one}")
     if not 0 < options.scale <= 8:
-        raise InputError(f"tradeoff: --scale {options.scale:g} is not allowed; allowed: a number > 0 and <= 8")
+        raise InputError(f"tradeoff: --scale {options.scale:g} is not allowed; use a number > 0 and <= 8")
     folder = "with a measurement" if measured and options.budget is not None else "without a measurement"
     check_relations("tradeoff", TRADEOFF, options, given, {"folder": folder})
     if measured and options.budget is None:

@@ -71,10 +71,10 @@ def _header(file: io.BufferedIOBase) -> tuple[tuple[int, ...], bool, np.dtype, i
     prefix = file.read(4 if wide else 2)
     length = int.from_bytes(prefix, "little")
     if length > LONGEST_HEADER:
-        raise RefusedArray(f"its header has {length} bytes; allowed: {LONGEST_HEADER}")
+        raise RefusedArray(f"its header has {length} bytes; use at most {LONGEST_HEADER}")
     shape, fortran, dtype = _entries(file.read(length).decode("latin-1"))
     if dtype.hasobject:
-        raise RefusedArray("it holds Python objects; allowed: numbers, as numpy.stack makes of arrays of one size")
+        raise RefusedArray("it holds Python objects; use numbers, as numpy.stack makes of arrays of one size")
     if (
         dtype.kind not in NUMBERS
         or dtype.itemsize > 8
@@ -82,9 +82,7 @@ def _header(file: io.BufferedIOBase) -> tuple[tuple[int, ...], bool, np.dtype, i
         or len(shape) > MOST_AXES
         or min(shape, default=0) < 0
     ):
-        raise RefusedArray(
-            f"{dtype} {shape}; allowed: plain numbers of at most 8 bytes, with {MOST_AXES} axes or fewer"
-        )
+        raise RefusedArray(f"{dtype} {shape}; use plain numbers of at most 8 bytes, with {MOST_AXES} axes or fewer")
     return shape, fortran, dtype, len(start) + len(prefix) + length
 
 
@@ -100,9 +98,7 @@ def _entries(header: str) -> tuple[tuple[int, ...], bool, np.dtype]:
     except Exception as error:  # any error that the literal or a dtype name causes
         raise RefusedArray(f"its header cannot be read: {plain_line(str(error)) or 'damaged'}") from None
     if not isinstance(shape, tuple) or any(type(side) is not int for side in shape) or type(fortran) is not bool:
-        raise RefusedArray(
-            "its header cannot be read: allowed: a shape of integers, and an order that is true or false"
-        )
+        raise RefusedArray("its header cannot be read: use a shape of integers, and an order that is true or false")
     return shape, fortran, dtype
 
 
@@ -170,15 +166,13 @@ def read_npz(path: Path, names: Collection[str], largest: int) -> dict[str, NDAr
 def _check_entries(path: Path, entries: list[zipfile.ZipInfo], largest: int, compressed: bool) -> None:
     names = [entry.filename.removesuffix(".npy") for entry in entries]
     if len(set(names)) < len(names):
-        raise InputError(f"{path}: an entry is listed twice; allowed: every array once")
+        raise InputError(f"{path}: an entry is listed twice; use every array once")
     if sum(entry.file_size for entry in entries) > largest:
-        raise InputError(f"{path}: its arrays have more than {largest} bytes together; allowed: at most {largest}")
+        raise InputError(f"{path}: its arrays have more than {largest} bytes together; use at most {largest}")
     for entry in entries:
         if entry.flag_bits & 1 or (entry.compress_type != zipfile.ZIP_STORED and not compressed):
-            raise InputError(
-                f"{path}: an entry is compressed or encrypted; allowed: arrays as `numpy.savez` stores them"
-            )
+            raise InputError(f"{path}: an entry is compressed or encrypted; use arrays as `numpy.savez` stores them")
         if entry.compress_type == zipfile.ZIP_STORED and entry.compress_size != entry.file_size:
             raise InputError(f"{path}: damaged: an entry states {entry.file_size} bytes and has {entry.compress_size}")
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise InputError(f"{path}: an entry is compressed in an unknown way; allowed: as `numpy.savez` does it")
+            raise InputError(f"{path}: an entry is compressed in an unknown way; use the compression of `numpy.savez`")

@@ -47,7 +47,7 @@ def open_regular(path: Path, largest: int) -> io.BufferedReader:
         status = os.fstat(descriptor)
         _check_regular(path, status.st_mode)
         if status.st_size > largest:
-            raise InputError(f"{path}: has {status.st_size} bytes; allowed: at most {largest}")
+            raise InputError(f"{path}: has {status.st_size} bytes; use at most {largest}")
     except BaseException:
         file.close()
         raise
@@ -63,7 +63,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
         except OSError as error:
             raise _refusal(path, error) from None
     if len(data) > size:
-        raise InputError(f"{path}: grew while it was read; allowed: a file that is not being written")
+        raise InputError(f"{path}: grew while it was read; use a file that is not being written")
     return data
 
 
@@ -98,7 +98,7 @@ def rename(source: Path, target: Path) -> None:
 def _check_regular(path: Path, mode: int) -> None:
     if not stat.S_ISREG(mode):
         kind = KINDS.get(stat.S_IFMT(mode), "a special file")
-        raise InputError(f"{path}: cannot be read: it is {kind}; allowed: a regular file")
+        raise InputError(f"{path}: cannot be read: it is {kind}; use a regular file")
 
 
 def _refusal(path: Path, error: OSError | ValueError) -> InputError:

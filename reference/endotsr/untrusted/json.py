@@ -26,7 +26,7 @@ def read_json(path: Path, largest: int = LARGEST_TEXT) -> Keys:
     """The JSON object of a file. Raises InputError for an unreadable file and for any other content, including NaN."""
     data = parsed(read_text(path, largest), str(path))
     if not isinstance(data, dict):
-        raise InputError(f"{path}: holds {type(data).__name__}; allowed: an object with keys, as the run wrote it")
+        raise InputError(f"{path}: holds {type(data).__name__}; use an object with keys, as the run wrote it")
     return data
 
 
@@ -65,7 +65,7 @@ def _finite(digits: str) -> float:
 
 def _integer(digits: str) -> int:
     if len(digits) > MOST_DIGITS:
-        raise ValueError(f"an integer of {len(digits)} digits; allowed: {MOST_DIGITS}")
+        raise ValueError(f"an integer of {len(digits)} digits; use at most {MOST_DIGITS}")
     return int(digits)
 
 
@@ -78,21 +78,21 @@ def number(value: Any, where: str, low: float = -math.inf, high: float = math.in
     if isinstance(value, int | float) and not isinstance(value, bool):
         if low <= value <= high and abs(value) <= 1.7e308:  # refuses NaN, infinity and integers beyond any float
             return float(value)
-    raise InputError(f"{where}: {shown(value)} is not allowed; allowed: {_range('a finite number', low, high)}")
+    raise InputError(f"{where}: {shown(value)} is not allowed; use {_range('a finite number', low, high)}")
 
 
 def integer(value: Any, where: str, low: float = -math.inf, high: float = math.inf) -> int:
     """An integer in [low, high]. Raises InputError for anything else, including True and False."""
     if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
         return value
-    raise InputError(f"{where}: {shown(value)} is not allowed; allowed: {_range('an integer', low, high)}")
+    raise InputError(f"{where}: {shown(value)} is not allowed; use {_range('an integer', low, high)}")
 
 
 def text(value: Any, where: str) -> str:
     """Text without a zero byte, which no path can contain. Raises InputError for anything else."""
     if isinstance(value, str) and "\0" not in value:
         return value
-    raise InputError(f"{where}: {shown(value)} is not allowed; allowed: text")
+    raise InputError(f"{where}: {shown(value)} is not allowed; use text")
 
 
 def listed(value: Any, where: str, count: int | None = None) -> list[Any]:
@@ -100,7 +100,7 @@ def listed(value: Any, where: str, count: int | None = None) -> list[Any]:
     if isinstance(value, list) and count in (None, len(value)):
         return value
     found = f"{len(value)} entries" if isinstance(value, list) else type(value).__name__
-    raise InputError(f"{where}: holds {found}; allowed: a list{'' if count is None else f' of {count} entries'}")
+    raise InputError(f"{where}: holds {found}; use a list{'' if count is None else f' of {count} entries'}")
 
 
 def _range(what: str, low: float, high: float) -> str:

@@ -97,7 +97,7 @@ def _unpacked(path: Path, largest: int) -> bytes:
                 raise InputError(f"{path}: damaged MAT-file: {error}") from None
         size += len(part)
         if size > largest:
-            raise InputError(f"{path}: more than {largest} bytes when unpacked; allowed: a smaller file")
+            raise InputError(f"{path}: more than {largest} bytes when unpacked; use a smaller file")
         parts.append(part)
     whole = b"".join([*parts, data[place:]])
     check_elements(whole, order, path)

@@ -7,7 +7,7 @@ import unicodedata
 from endotsr.errors import INVISIBLE, InputError, visible
 
 LONGEST_NAME = 200  # bytes in UTF-8: file systems allow 255, and suffixes such as `_comparison.png` are appended
-ALLOWED = f"allowed: the name of one file, without folders and control characters, at most {LONGEST_NAME} bytes"
+ALLOWED = f"use the name of one file, without folders and control characters, at most {LONGEST_NAME} bytes"
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{k}" for port in ("COM", "LPT") for k in "0123456789¹²³")}
 SEPARATORS = "/\\"  # of every system: a run folder may be read on another one
 DECIMAL_COMMA = re.compile(r"(?:^|[\s;])-?\d+,\d+(?=$|[\s;])", re.MULTILINE)  # 0,25 between spaces or semicolons

@@ -99,7 +99,7 @@ def _header(chunks: list[tuple[bytes, bytes]], name: object) -> PngHeader:
     if bits not in DEPTHS.get(colour, ()) or packing or filtering or interlace > 1:
         raise InputError(f"{name}: damaged PNG: its header states a kind of picture that does not exist")
     if not 0 < width * height <= MOST_PIXELS:
-        raise InputError(f"{name}: {width}x{height} pixels; allowed: 1 to {MOST_PIXELS} pixels")
+        raise InputError(f"{name}: {width}x{height} pixels; use 1 to {MOST_PIXELS} pixels")
     return PngHeader(width, height, bits, colour, interlace == 1)
 
 
@@ -107,7 +107,7 @@ def _refuse_moving(chunks: list[tuple[bytes, bytes]], name: object) -> None:
     """Refuse an animated PNG, of which a decoder returns the first picture only."""
     frames = next((int.from_bytes(content[:4], "big") for kind, content in chunks if kind == b"acTL"), 1)
     if frames > 1:
-        raise InputError(f"{name}: holds {frames} pictures; allowed: one picture per file")
+        raise InputError(f"{name}: holds {frames} pictures; use one picture per file")
 
 
 def _palette(chunks: list[tuple[bytes, bytes]], header: PngHeader, name: object) -> list[tuple[bytes, bytes]]:

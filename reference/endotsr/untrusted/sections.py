@@ -58,7 +58,7 @@ def unknown_key(key: str, allowed: Iterable[str], prefix: str = "") -> str:
     """What is wrong with an unknown key: the allowed ones, and at the end the one that is spelled most like it."""
     listed = list(allowed)
     meant = "".join(f"; did you mean {name}?" for name in difflib.get_close_matches(key, listed, n=1))
-    return f"unknown key {prefix}{key}; allowed: {', '.join(listed)}{meant}"
+    return f"unknown key {prefix}{key}; use one of {', '.join(listed)}{meant}"
 
 
 def is_section(kind: Any) -> bool:
@@ -72,7 +72,7 @@ def _refuse_non_finite(data: dict, where: str, prefix: str) -> None:
             _refuse_non_finite(value, where, f"{prefix}{key}.")
         for number in value if isinstance(value, list | tuple) else [value]:
             if isinstance(number, float) and not math.isfinite(number):
-                raise InputError(f"{where}: {prefix}{key} = {value!r} is not allowed; allowed: finite numbers")
+                raise InputError(f"{where}: {prefix}{key} = {value!r} is not allowed; use finite numbers")
 
 
 def _explain(message: str, data: dict, kind: Any, prefix: str) -> str:
@@ -88,14 +88,20 @@ def _explain(message: str, data: dict, kind: Any, prefix: str) -> str:
         kind = next(filter(is_section, get_args(kind)), kind)  # an optional section
         kind = {f.name: f.type for f in msgspec.structs.fields(kind)}[name]
         value = value[name]
-    return f"{prefix}{found[1]} = {value!r} is not allowed; allowed: {allowed_values(kind)}"
+    return f"{prefix}{found[1]} = {value!r} is not allowed; use {allowed_values(kind)}"
+
+
+def choice(words: Iterable[str]) -> str:
+    """Alternatives in words: `a`, `a or b`, `one of a, b, c`."""
+    listed = list(words)
+    return " or ".join(listed) if len(listed) < 3 else f"one of {', '.join(listed)}"
 
 
 def allowed_values(kind: Any) -> str:
-    """The allowed values of a type in words: `a number > 0`, `quartic, gaussian`, ..."""
+    """The allowed values of a type in words: `a number > 0`, `quartic or gaussian`, `one of a, b, c`, ..."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Literal:
-        return ", ".join(map(str, arguments))
+        return choice(map(str, arguments))
     if origin in (Union, UnionType):
         return " or ".join(allowed_values(part) for part in arguments if part is not NoneType)
     if origin in (tuple, list):
@@ -110,4 +116,4 @@ def allowed_values(kind: Any) -> str:
         return "a table of keys"
     if is_section(kind):
         return "a section of settings"
-    return {bool: "true, false", int: "an integer", float: "a number", str: "text", Path: "a path"}[kind]
+    return {bool: "true or false", int: "an integer", float: "a number", str: "text", Path: "a path"}[kind]

@@ -19,7 +19,7 @@ from endotsr.untrusted.names import plain_line
 OF_SYSTEMS = ("thumbs.db", "ehthumbs.db", "desktop.ini", "@eadir")  # written by systems into folders of pictures
 MOST_NAMED = 5
 FULL = (errno.ENOSPC, errno.EDQUOT)  # errors of a full disk
-LINK = "is a link; allowed: a folder, or a name that is free"
+LINK = "is a link; use a folder, or a name that is free"
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:

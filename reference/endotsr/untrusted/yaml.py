@@ -41,7 +41,7 @@ def read_yaml(path: Path) -> Keys:
     if len(documents) > 1 and found is None:
         raise InputError(f"{path}: {len(documents)} documents that differ; use a file with one")
     if not isinstance(found, dict):
-        raise InputError(f"{path}: holds no keys; allowed: YAML of the form `key: value`")
+        raise InputError(f"{path}: holds no keys; use YAML of the form `key: value`")
     return _with_names(found)
 
 
@@ -97,4 +97,4 @@ def matrix(value: Any, where: str, *shapes: tuple[int, ...]) -> NDArray[np.float
             if np.isfinite(numbers).all():
                 return numbers.reshape(shape)
     allowed = " or ".join("x".join(str(n) if n > 0 else "n" for n in shape) for shape in shapes)
-    raise InputError(f"{where}: allowed: {allowed} finite numbers")
+    raise InputError(f"{where}: use {allowed} finite numbers")

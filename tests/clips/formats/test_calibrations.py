@@ -130,12 +130,12 @@ REFUSED = {
     "camera_model 'omni'": ("a.yaml", kalibr(camera_model="omni")),
     "6 distortion coefficients": ("a.yaml", ros(K, [0.1] * 6)),
     "resolution": ("a.yaml", kalibr(resolution=[128.5, 96])),
-    "allowed: 3x3 finite numbers": ("a.yaml", "camera_matrix: [1, 2]"),
+    "use 3x3 finite numbers": ("a.yaml", "camera_matrix: [1, 2]"),
     "R is missing": ("a.yaml", "M1: [1,0,0,0,1,0,0,0,1]\nM2: [1,0,0,0,1,0,0,0,1]"),
     "could not determine a constructor": ("a.yaml", "camera_matrix: !!python/object/apply:os.getcwd []"),
     "4 words": ("a.txt", "1 2 3 4"),
-    "allowed: rows": ("a.txt", "100 0 63 0 100 47 0 1 1"),
-    "allowed: FILE.ini": ("a.dat", "<x/>"),
+    "use rows": ("a.txt", "100 0 63 0 100 47 0 1 1"),
+    "use FILE.ini": ("a.dat", "<x/>"),
 }  # fmt: skip
 
 

@@ -66,13 +66,13 @@ def test_one_file_a_frame_and_one_for_all(tmp_path, capsys):
 @pytest.mark.parametrize(
     "array, said",
     [
-        (TOOL * 0.7, "holds 0.7; allowed: whole numbers from 0 to 65535, or True and False; a threshold makes a mask"),
-        (TOOL * -1, "holds -1; allowed"),
-        (TOOL * 70_000, "holds 70000; allowed"),
-        (np.where(TOOL, np.nan, 0), "holds nan; allowed"),
+        (TOOL * 0.7, "holds 0.7; use whole numbers from 0 to 65535, or True and False; a threshold makes a mask"),
+        (TOOL * -1, "holds -1; use"),
+        (TOOL * 70_000, "holds 70000; use"),
+        (np.where(TOOL, np.nan, 0), "holds nan; use"),
         (TOOL[:, :, :20], "20x24"),
         (TOOL[:4], "1 of 5 frames have no mask"),
-        (TOOL[..., None].repeat(4, axis=3), "allowed: one array of real numbers, (frames, height, width)"),
+        (TOOL[..., None].repeat(4, axis=3), "use one array of real numbers, (frames, height, width)"),
     ],
     ids=["probabilities", "negative", "too large", "NaN", "another shape", "too few frames", "colours"],
 )

@@ -112,7 +112,7 @@ def test_a_file_gives_its_masks(tmp_path):
 
 HOSTILE = {
     "no JSON": ("{", "cannot be read"),
-    "a list": ([], "allowed: an object"),
+    "a list": ([], "use an object"),
     "another format": (content(format="x"), "format: 'x' is not allowed"),
     "no format": ({}, "format: None is not allowed"),
     "unknown key": (content(more=1), "unknown field `more`"),
@@ -134,7 +134,7 @@ HOSTILE = {
     "a frame twice": (content(keys=2 * [{"frame": 0, "name": "a", "shapes": []}]), "keys[1].frame: 0 stands twice"),
     "another name": (content(keys=[{"frame": 1, "name": "../x", "shapes": []}]), "keys[0].name: '../x' is not allowed"),
     "many points": (
-        content(never=[square(points=[[0, 0]] * 4000)] * (MOST_POINTS // 4000 + 1)), f"allowed: at most {MOST_POINTS}"
+        content(never=[square(points=[[0, 0]] * 4000)] * (MOST_POINTS // 4000 + 1)), f"use at most {MOST_POINTS}"
     ),
     "a long shape": (content(never=[square(points=[[0, 0]] * 5001)]), "never[0].points"),
     "many shapes": (content(never=[square(points=[[0, 0]])] * 1001), "never"),

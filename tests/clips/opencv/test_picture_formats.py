@@ -115,15 +115,15 @@ REFUSED = {
     "transparent tiff": ("tiff", transparent("tiff"), "has transparent pixels"),
     "transparent webp": ("webp", transparent("webp"), "has transparent pixels"),
     "half transparent grey tiff": ("tiff", saved(Image.fromarray(COLOUR[:, :, :2], "LA"), "tiff"), "of the mode LA"),
-    "huge tiff": ("tiff", huge_tiff(), "60000x60000 pixels; allowed: at most"),
+    "huge tiff": ("tiff", huge_tiff(), "60000x60000 pixels; use at most"),
     "another kind": ("tiff", saved(COLOUR, "bmp"), "not a TIFF file by its first bytes; it is a BMP file: let its name"
                      " end in .bmp"),
     "png named webp": ("webp", saved(COLOUR, "png"), "it is a PNG file: let its name end in .png"),
     "tiff named jpg": ("jpg", saved(COLOUR, "tiff"), "it is a TIFF file: let its name end in .tif"),
     "webp named bmp": ("bmp", saved(COLOUR, "webp"), "it is a WebP file: let its name end in .webp"),
     "jpg named png": ("png", saved(COLOUR, "jpeg"), "it is a JPEG file: let its name end in .jpg"),
-    "huge bmp": ("bmp", huge_bmp(""), "60000x60000 pixels; allowed: at most"),
-    **{f"huge webp {form}": ("webp", huge_webp(form), "16383x16383 pixels; allowed: at most")
+    "huge bmp": ("bmp", huge_bmp(""), "60000x60000 pixels; use at most"),
+    **{f"huge webp {form}": ("webp", huge_webp(form), "16383x16383 pixels; use at most")
        for form in ("VP8X", "VP8L", "VP8 ")},
 }  # fmt: skip
 

@@ -200,7 +200,7 @@ def test_small_pictures_are_estimated_and_smaller_ones_are_refused(width, height
     found = simulate(with_settings(settings, camera_motion=path)).sequence
     folder = written(tmp_path / "clip", Views(found.images, found.masks, found.depth, found.cameras[0]))
     if width < 96:
-        with pytest.raises(InputError, match="80x64 pixels are too small to estimate poses from; allowed: at least 96"):
+        with pytest.raises(InputError, match="80x64 pixels are too small to estimate poses from; use at least 96"):
             enter_poses(folder)
         return
     assert enter_poses(folder).written

@@ -128,7 +128,7 @@ def test_depth_of_another_scale_in_every_frame_is_refused(tmp_path, reconstructi
     )
     before = (folder / "sequence.toml").read_bytes()
     with pytest.raises(
-        InputError, match=r"scale of the path cannot be told.*allowed: 10%, and 50% for the points.*--replace"
+        InputError, match=r"scale of the path cannot be told.*the limits are 10%, and 50% for the points.*--replace"
     ):
         enter_structure(folder)
     assert (folder / "sequence.toml").read_bytes() == before
@@ -174,7 +174,7 @@ def test_too_few_registered_frames_are_refused():
         return Structure(poses, np.zeros((0, 3)), [], [], 0.0, [3, 2])
 
     refuse_too_few(without({3, 7, 11, 15}))
-    with pytest.raises(InputError, match=r"15 of 20 frames are registered; further models.* 3, 2 frames; allowed.*80%"):
+    with pytest.raises(InputError, match=r"15 of 20 frames are registered; further models.* 3, 2 frames; use.*80%"):
         refuse_too_few(without({3, 7, 11, 15, 17}))
     refuse_too_few(without(set(range(10, 10 + LONGEST_GAP)), 60))
     for first in (0, 10, 60 - LONGEST_GAP - 1):
@@ -268,5 +268,5 @@ def test_a_still_scope_and_a_cut_are_refused(tmp_path, capsys):
     images[6:] = rng.integers(0, 255, images[6:].shape, dtype=np.uint8)
     folder = written(tmp_path / "cut", views._replace(images=images), depth=False)
     assert main(["poses", str(folder), "--sfm"]) == 2
-    assert "6 of 12 frames are registered; allowed: at least 80%" in capsys.readouterr().err
+    assert "6 of 12 frames are registered; use at least 80%" in capsys.readouterr().err
     assert "poses" not in (folder / "sequence.toml").read_text("utf-8")

@@ -84,7 +84,7 @@ def test_a_prepared_folder_is_told_where_its_rate_is_stated(tmp_path, capsys):
 
 def test_separate_pairs_have_no_rate_to_state():
     """--source-rate is refused for SERV-CT, so it is no remedy there."""
-    with pytest.raises(InputError, match="frame rate is unknown; allowed: a recording") as refused:
+    with pytest.raises(InputError, match="frame rate is unknown; use a recording") as refused:
         thinned(replace(recording(), layout="servct"), [0, 1, 2], 5.0, [])
     assert "--source-rate" not in str(refused.value)
 
@@ -93,7 +93,7 @@ def test_an_endonerf_folder_takes_the_rate_that_its_refusal_names(tmp_path, caps
     """The layout states no times: --rate asked for --source-rate, which was refused too."""
     write_synthetic_folder(tmp_path / "clip", frames=8)
     out, base = tmp_path / "o", ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o")]
-    assert main([*base, "--rate", "5"]) == 2 and "allowed: --source-rate" in capsys.readouterr().err
+    assert main([*base, "--rate", "5"]) == 2 and "use --source-rate" in capsys.readouterr().err
     for words, rate in ((["--rate", "5"], 5), (["--frames", "0.1s:0.5s"], 10)):
         shutil.rmtree(out, ignore_errors=True)
         assert main([*base, "--source-rate", "10", *words]) == 0
@@ -342,7 +342,7 @@ def test_pairs_paired_by_time_keep_no_more_pictures_than_the_lag():
 
 
 def test_a_lag_needs_right_pictures_and_a_longer_clip():
-    with pytest.raises(InputError, match="--right-late 20: allowed: -19 to 19 for 20 frames"):
+    with pytest.raises(InputError, match="--right-late 20: use -19 to 19 for 20 frames"):
         paired_by_time(recording(), 20)
     with pytest.raises(InputError, match="no right pictures"):
         next(paired_by_time(recording(), 1).pictures([3]))
@@ -367,7 +367,7 @@ def test_masks_that_lag_are_given_to_the_pictures_of_their_moment(late, tmp_path
 
 def test_a_lag_of_masks_needs_masks_and_a_longer_clip():
     masks = Masks(lambda i: np.full((2, 2), i % 2 == 0))
-    with pytest.raises(InputError, match="--masks-late -20: allowed: -19 to 19 for 20 frames"):
+    with pytest.raises(InputError, match="--masks-late -20: use -19 to 19 for 20 frames"):
         masks_by_time(recording(masks=masks), -20)
     with pytest.raises(InputError, match="no masks; --masks-late is allowed for a clip with masks alone"):
         masks_by_time(recording(), 1)

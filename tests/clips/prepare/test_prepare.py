@@ -240,12 +240,12 @@ def test_gaps_are_named_refused_left_out_or_filled(tmp_path, what):
         lines = (tmp_path / "raw" / what).read_text().splitlines()
         (tmp_path / "raw" / what).write_text("\n".join(lines[:2] + lines[3:]))
     word = "mask" if what == "masks" else "pose"
-    with pytest.raises(InputError, match=f"1 of 6 frames have no {word}: 2; allowed: --gaps"):
+    with pytest.raises(InputError, match=f"1 of 6 frames have no {word}: 2; use --gaps"):
         prepared(tmp_path / "raw", tmp_path / "a")
     assert not (tmp_path / "a").exists()
     assert prepared(tmp_path / "raw", tmp_path / "b", PrepareSettings(gaps="drop"))[0].frames == 5
     for gaps in ("refuse", "drop", "fill"):
-        with pytest.raises(InputError, match=f"1 of 1 frames have no {word}: 2; allowed: --frames some of which have"):
+        with pytest.raises(InputError, match=f"1 of 1 frames have no {word}: 2; use --frames some of which have"):
             prepared(tmp_path / "raw", tmp_path / "d", PrepareSettings(frames="2", gaps=gaps))
     found, notes = prepared(tmp_path / "raw", tmp_path / "c", PrepareSettings(gaps="fill"))
     assert found.frames == 6 and any(f"no {word}: 2" in note for note in notes)
@@ -316,7 +316,7 @@ def test_a_distorted_picture_is_straightened(tmp_path):
 WRONG = {
     "no intrinsics": (lambda p: None, {}, "intrinsics are unknown; use --camera"),
     "no mask of these numbers": (lambda p: masks(p, "m90", "m91"), {"camera": CAMERA}, "no file has the number"),
-    "trajectory": (lambda p: (p / "t.txt").write_text("0 0 0 0 0 1"), {"camera": CAMERA}, "line 1: allowed: 8"),
+    "trajectory": (lambda p: (p / "t.txt").write_text("0 0 0 0 0 1"), {"camera": CAMERA}, "line 1: use 8"),
     "quaternion": (lambda p: (p / "t.txt").write_text("0 0 0 0 0 0 0 2"), {"camera": CAMERA}, "has length 2"),
     "trajectory empty": (lambda p: (p / "t.txt").write_text("# x\n"), {"camera": CAMERA}, "holds no pose"),
     "no rate": (lambda p: (p / "t.txt").write_text("0.5 0 0 0 0 0 0 1"), {"camera": CAMERA}, "known frame rate"),
@@ -349,7 +349,7 @@ STEREOMIS = {
     "key": (lambda p: swap(p, "fc_x = 60\n", ""), r"\[StereoLeft\] fc_x is missing"),
     "coefficient left out": (lambda p: swap(p, "kc_5 = 0.0\n", ""), r"kc_5 is missing"),
     "six coefficients": (lambda p: swap(p, "kc_5 = 0.0\nkc_6 = 0.0\nkc_7 = 0.0", "kc_5 = 0.1"),
-                         r"kc_0 .. kc_7: 6 distortion coefficients; allowed: none, 4, 5 or 8"),
+                         r"kc_0 .. kc_7: 6 distortion coefficients; use none, 4, 5 or 8"),
     "text": (lambda p: swap(p, "fc_x = 60\n", "fc_x = a\n"), r"fc_x = 'a' is not allowed"),
     "size": (lambda p: swap(p, "res_y = 48", "res_y = 100"), "of 64x100 pixels, the pictures have 64x48"),
     "swapped": (lambda p: swap(p, "T_0 = -4.0", "T_0 = 4.0"), "right camera is on the left"),
@@ -407,7 +407,7 @@ def test_the_command(tmp_path, capsys):
     assert "exists already" in capsys.readouterr().err
     assert main(["prepare", str(tmp_path / "none"), "--out", str(tmp_path / "x")]) == 2
     assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "x"), "--camera", "1", "2"]) == 2
-    assert "--camera: 2 numbers; allowed: 4" in capsys.readouterr().err
+    assert "--camera: 2 numbers; use 4" in capsys.readouterr().err
 
 
 def test_a_clip_with_poses_is_told_of_no_depth_that_they_exclude(tmp_path, capsys):
@@ -431,9 +431,7 @@ def test_a_pair_without_a_baseline_is_told_which_number_is_missing(tmp_path, cap
     assert "next: set the baseline of the two cameras, [camera] baseline" in capsys.readouterr().out
     with pytest.raises(InputError, match="once \\[camera\\] baseline, the distance between the two cameras"):
         read_sequence(tmp_path / "o", WHOLE, 0.2)
-    assert (
-        main(["depth", str(tmp_path / "o")]) == 2 and "allowed: the distance between the two" in capsys.readouterr().err
-    )
+    assert main(["depth", str(tmp_path / "o")]) == 2 and "use the distance between the two" in capsys.readouterr().err
 
 
 def test_a_pipe_gets_no_carriage_returns(tmp_path, capsys):
@@ -462,4 +460,4 @@ def test_an_arbitrary_unit_beside_known_lengths_is_refused(tmp_path, make, optio
         words += ["--depth", str(tmp_path / "given")]
     assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "out"), *words]) == 2
     said = capsys.readouterr().err
-    assert f"--{option}-unit arbitrary: the layout" in said and "allowed: um, mm, cm, m" in said
+    assert f"--{option}-unit arbitrary: the layout" in said and "use one of um, mm, cm, m" in said

@@ -118,7 +118,7 @@ def test_numbers_that_fall_towards_the_camera_are_refused(tmp_path, capsys):
     (tmp_path / "two").mkdir()
     where, files = clip(tmp_path / "two", lambda i: true_depth(i) / 100)
     sparse(where)
-    assert given(where, files, "--replace") == 2 and "allowed: a relative inverse depth" in capsys.readouterr().err
+    assert given(where, files, "--replace") == 2 and "use a relative inverse depth" in capsys.readouterr().err
 
 
 def test_a_plane_is_trained_on_with_a_warning_and_a_measured_one_is_still_refused(tmp_path, capsys):

@@ -115,9 +115,9 @@ def test_the_wound_meets_the_edges_of_the_tissue(cut):
 
 
 def test_a_slit_that_would_fold_the_tissue_is_refused():
-    with pytest.raises(InputError, match=r"cutting.opening = 30 folds .* allowed: at most 20.8 with cutting.reach = 7"):
+    with pytest.raises(InputError, match=r"cutting.opening = 30 folds .* use at most 20.8 with cutting.reach = 7"):
         simulate(with_settings(with_effects(SMALL, "cutting"), cutting={"opening": 30.0}))
-    with pytest.raises(InputError, match=r"cutting.stop = 0.1: allowed: above cutting.start = 0.2"):
+    with pytest.raises(InputError, match=r"cutting.stop = 0.1: use a number above cutting.start = 0.2"):
         simulate(with_settings(with_effects(SMALL, "cutting"), cutting={"start": 0.2, "stop": 0.1}))
 
 

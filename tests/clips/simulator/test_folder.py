@@ -96,9 +96,9 @@ def test_names_of_scenes_and_effects():
     assert scene_of("breathing, smoke").smoke.on and effects_on(scene_of("")) == IN_FILES
     size = named_scene("everything")
     assert (size.width, size.height, size.frames) == (640, 512, 63)
-    with pytest.raises(InputError, match="scene 'stil' is not allowed; allowed: still, breathing, pulling"):
+    with pytest.raises(InputError, match="scene 'stil' is not allowed; use one of still, breathing, pulling"):
         named_scene("stil")
-    with pytest.raises(InputError, match="effects: unknown: fog; allowed: breathing"):
+    with pytest.raises(InputError, match="effects: unknown: fog; use one of breathing"):
         scene_of("breathing,fog")
 
 
@@ -121,7 +121,7 @@ def test_the_named_scenes_stay_in_the_picture(name):
 )
 def test_what_leaves_the_field_of_view_is_refused_with_the_largest_allowed_value(name, section, key, value):
     settings = small(name)
-    with pytest.raises(InputError, match=rf"{section}.{key} = {value:g} leaves .* allowed: at most") as caught:
+    with pytest.raises(InputError, match=rf"{section}.{key} = {value:g} leaves .* use at most") as caught:
         check_field_of_view(with_settings(settings, **{section: {key: value}}))
     largest = float(str(caught.value).rsplit(" ", 1)[1])
     check_field_of_view(with_settings(settings, **{section: {key: largest}}))
@@ -131,13 +131,13 @@ def test_what_leaves_the_field_of_view_is_refused_with_the_largest_allowed_value
 
 def test_what_a_folder_cannot_hold_is_refused():
     still = small("still")
-    with pytest.raises(InputError, match=r"depth_rounding.step = 0.5 does not fit .* allowed: 1, 2, 3"):
+    with pytest.raises(InputError, match=r"depth_rounding.step = 0.5 does not fit .* use 1, 2, 3"):
         check_scene(with_settings(still, depth_rounding={"step": 0.5}))
     with pytest.raises(InputError, match=r"depth_rounding.on = False"):
         check_scene(with_effects(SimulatorSettings(**SMALL), "stereo"))
     with pytest.raises(InputError, match="without an excluded pixel"):
         check_scene(with_settings(still, stereo={"on": False}))
-    with pytest.raises(InputError, match=r"allowed: a smaller focal, or smaller pulsation.amplitude"):
+    with pytest.raises(InputError, match=r"use a smaller focal, or smaller pulsation.amplitude"):
         check_scene(with_settings(small("breathing"), focal=4.0, pulsation={"amplitude": 0.1}))
 
 
@@ -150,5 +150,5 @@ def test_without_stereo_there_is_no_right_picture(tmp_path):
 
 def test_depth_beyond_the_largest_level_is_refused(tmp_path):
     deep = with_settings(small("still"), depth_errors={"on": True, "sigma": 1e6})
-    with pytest.raises(InputError, match=r"depth/000000.png: the prior depth reaches \d+ mm; allowed: at most 65535"):
+    with pytest.raises(InputError, match=r"depth/000000.png: the prior depth reaches \d+ mm; use at most 65535"):
         write_sequence(tmp_path, deep, "still")

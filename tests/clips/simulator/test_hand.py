@@ -54,5 +54,5 @@ def test_the_scene_is_that_of_the_orbit():
 
 
 def test_a_path_beyond_the_tissue_is_refused():
-    with pytest.raises(InputError, match=r"camera_motion.amplitude = 60 leaves .* allowed: at most"):
+    with pytest.raises(InputError, match=r"camera_motion.amplitude = 60 leaves .* use at most"):
         check_field_of_view(hand(amplitude=60.0))

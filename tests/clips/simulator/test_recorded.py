@@ -63,14 +63,14 @@ def test_tracks_of_other_settings_are_refused(changeable):
     text = path.read_text(encoding="utf-8")
     assert f'"amplitude": {SETTINGS.breathing.amplitude}' in text
     path.write_text(text.replace(f'"amplitude": {SETTINGS.breathing.amplitude}', '"amplitude": 0.5', 1))
-    with pytest.raises(InputError, match=r"tracks\.npz: position at time .* allowed: those of truth.json"):
+    with pytest.raises(InputError, match=r"tracks\.npz: position at time .* use those of truth.json"):
         check_truth(changeable)
 
 
 def test_frames_of_another_scene_are_refused(folder):
     sequence = read_sequence(folder, SequenceConfig())
     sequence.names[2] = "000017"
-    with pytest.raises(InputError, match=r"frame '000017' of the sequence .* allowed: 000000 to 000005"):
+    with pytest.raises(InputError, match=r"frame '000017' of the sequence .* use 000000 to 000005"):
         recorded_positions(folder, sequence)
 
 

@@ -94,10 +94,10 @@ def rewrite(path, **changes):
     ("file", "changes", "message"),
     [
         ("light.npz", {"gain": None}, "light.npz: gain is missing"),
-        ("light.npz", {"gain": np.ones((7, 4))}, r"gain is float64 of shape \(7, 4\); allowed: real numbers, \(7, 3\)"),
+        ("light.npz", {"gain": np.ones((7, 4))}, r"gain is float64 of shape \(7, 4\); use real numbers, \(7, 3\)"),
         ("light.npz", {"times": np.array(["a"] * 7)}, "times: <U1"),
         ("light.npz", {"noise_sigma": np.array(np.nan)}, "noise_sigma holds a number that is not finite"),
-        ("tracks.npz", {"visible": np.ones((7, 456))}, "visible is float64 .* allowed: true or false"),
+        ("tracks.npz", {"visible": np.ones((7, 456))}, "visible is float64 .* use true or false"),
         ("tracks.npz", {"pixel": np.zeros((7, 2, 3))}, r"pixel is float64 of shape \(7, 2, 3\)"),
         ("tracks.npz", {"depth": np.full((7, 456), np.inf)}, "depth holds a number that is not finite"),
         ("tracks.npz", {"light": np.array([object()])}, r"tracks.npz: light: it holds Python objects"),
@@ -119,7 +119,7 @@ def test_damaged_frames_are_refused(copy):
     (frames / "000004.npz").write_bytes((frames / "000000.npz").read_bytes()[:900])
     shutil.copy(frames / "000000.npz", copy / "truth" / "instrument" / "000005.png")
     for i, message in (
-        (1, r"000001.npz: depth is float32 of shape \(3, 3\); allowed: real numbers, \(40, 48\)"),
+        (1, r"000001.npz: depth is float32 of shape \(3, 3\); use real numbers, \(40, 48\)"),
         (2, "000002.npz: not an .npz file"),
         (3, "000003.npz: cannot be read: No such file"),
         (4, "000004.npz: not an .npz file, or cut short"),
@@ -132,9 +132,9 @@ def test_damaged_frames_are_refused(copy):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda data: data | {"format": 2}, "truth.json: format = 2 is not allowed; allowed: 1"),
+        (lambda data: data | {"format": 2}, "truth.json: format = 2 is not allowed; use 1"),
         (lambda data: {"format": 1}, "truth.json: settings is missing"),
-        (lambda data: [1], "truth.json: holds list; allowed: an object"),
+        (lambda data: [1], "truth.json: holds list; use an object"),
         (lambda data: data | {"settings": data["settings"] | {"width": 3}}, "settings.width = 3 is not allowed"),
         (lambda data: data | {"settings": data["settings"] | {"fog": {}}}, "fog"),
     ],
@@ -147,7 +147,7 @@ def test_a_damaged_record_is_refused(copy, change, message):
 
 
 def test_a_folder_without_truth_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"truth.json: file not found; allowed: a sequence folder that `endotsr simul"):
+    with pytest.raises(InputError, match=r"truth.json: file not found; use a sequence folder that `endotsr simul"):
         read_truth(tmp_path)
     (tmp_path / "truth").mkdir()
     (tmp_path / "truth" / "truth.json").write_text("{")

@@ -208,7 +208,7 @@ def test_hard_W6_stamps_outside_the_unit_interval(dtype):
 
 @pytest.mark.parametrize("arguments", [(0, 1, 16), (8, 0, 16), (8, -1, 16), (8, 16, 1), (8, 1, np.inf), (8, np.nan, 2)])
 def test_refused_frequencies(arguments):
-    with pytest.raises(ValueError, match="allowed"):
+    with pytest.raises(ValueError, match=r"use (finite numbers|an integer)"):
         frequencies(*arguments)
 
 

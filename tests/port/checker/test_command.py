@@ -59,7 +59,7 @@ def test_same_seed_same_report(two_pairs, capsys):
 
 
 def test_unknown_name_and_unwritable_file(two_pairs, tmp_path):
-    with pytest.raises(InputError, match="'left' is not a registered stage; allowed: right, wrong"):
+    with pytest.raises(InputError, match="'left' is not a registered stage; use one of right, wrong"):
         run(["left"], 0, None)
     with pytest.raises(InputError, match=r"missing/report\.json: cannot be written: .*missing is not a folder"):
         run(["right"], 0, tmp_path / "missing" / "report.json")
@@ -81,7 +81,7 @@ def test_the_table_is_printed_before_the_file_is_written(monkeypatch, capsys, tm
 
 
 def test_a_seed_below_zero_is_refused(two_pairs, capsys):
-    with pytest.raises(InputError, match="--seed -1 is not allowed; allowed: an integer >= 0"):
+    with pytest.raises(InputError, match="--seed -1 is not allowed; use an integer >= 0"):
         run(["right"], -1, None)
     assert capsys.readouterr().out == ""
 

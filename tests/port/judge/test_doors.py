@@ -153,7 +153,7 @@ def test_foreign_files_in_the_kept_folder_stay(name, tmp_path):
     mine = tmp_path / name / "mine.txt"
     mine.parent.mkdir()
     mine.write_text("mine")
-    with pytest.raises(InputError, match=f"{name} was not made by .*allowed: a folder without requests, outputs"):
+    with pytest.raises(InputError, match=f"{name} was not made by .*use a folder without requests, outputs"):
         run(["run", "--level", "0", "--keep", str(tmp_path), "--port", "true {requests} {outputs}"])
     assert mine.read_text() == "mine" and [path.name for path in tmp_path.iterdir()] == [name]
 
@@ -201,7 +201,7 @@ def test_one_family_or_case_is_judged_alone_and_without_a_claim(golden, answered
         assert len(report.cases) == count and report.claim == f"no claim: only {only} was judged"
     words = ["judge", str(folder), "--precision", precision, "--level", "1", "--only"]
     assert run([*words, "motion"]) == 0 and capsys.readouterr().out.endswith("no claim: only motion was judged\n")
-    with pytest.raises(InputError, match="no such case; allowed: reading, "):
+    with pytest.raises(InputError, match="no such case; use one of reading, "):
         run([*words, "no_family"])
     assert run(["run", "--port", REFERENCE, "--level", "2", "--only", "matern", "--keep", str(tmp_path / "kept")]) == 0
     assert [p.name for p in (tmp_path / "kept" / "requests").iterdir() if p.is_dir()] == ["matern"]

@@ -151,7 +151,7 @@ def test_levels_without_outputs_count_in_a_profile_alone():
 
 
 def test_an_unknown_profile_is_refused(golden, answered):
-    with pytest.raises(InputError, match="no such profile; allowed: renderer-forward"):
+    with pytest.raises(InputError, match="no such profile; use one of renderer-forward"):
         of_profile(golden.cases, "viewer")
     with pytest.raises(InputError, match="motion is no part"):
         judge(golden, answered, "float32", profile="renderer", only="motion")

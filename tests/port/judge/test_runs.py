@@ -41,10 +41,10 @@ def test_a_run_that_fails_takes_the_claim(golden, tmp_path):
 
 def test_what_cannot_be_asked_is_refused(golden, tmp_path):
     for number in (0, 1001):
-        with pytest.raises(InputError, match=f"--runs {number}; allowed: 1 to 1000"):
+        with pytest.raises(InputError, match=f"--runs {number}; use 1 to 1000"):
             called(golden, tmp_path, [0.0], runs=number)
     for seconds in (0.0, -1.0, float("nan")):
-        with pytest.raises(InputError, match=r"--timeout .*; allowed: seconds above 0"):
+        with pytest.raises(InputError, match=r"--timeout .*; use seconds above 0"):
             called(golden, tmp_path, [0.0], timeout=seconds)
     assert not (tmp_path / "kept").exists()
     with pytest.raises(InputError, match="level 5 asks for the same bits"):

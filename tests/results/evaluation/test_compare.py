@@ -56,8 +56,8 @@ def test_one_clip_in_two_layouts_is_compared():
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        (method("b", [1.0, 2.0]), "b: 2 frames from f0 to f1; a: 3 frames from f0 to f2; allowed: the same held-out"),
-        (method("a", [1.0, 2.0, 3.0]), "two methods are called 'a'; allowed: NAME=PATH"),
+        (method("b", [1.0, 2.0]), "b: 2 frames from f0 to f1; a: 3 frames from f0 to f2; use the same held-out"),
+        (method("a", [1.0, 2.0, 3.0]), "two methods are called 'a'; use NAME=PATH"),
         (method("b", [1.0, 2.0, 3.0], {"images": "a", "masks": "c"}), "b and a: measured on different masks"),
     ],
 )
@@ -69,7 +69,7 @@ def test_methods_that_cannot_be_compared_are_refused(other, said):
 
 @pytest.mark.parametrize("metrics", [{}, {"held_out": {}}, {"held_out": {"per_frame": [{"frame": 1}]}}, {"run": 3}])
 def test_files_that_are_no_metrics_are_refused(metrics):
-    with pytest.raises(InputError, match=r"found\.json: .*allowed: a file that `endotsr evaluate` wrote"):
+    with pytest.raises(InputError, match=r"found\.json: .*use a file that `endotsr evaluate` wrote"):
         methods_of(metrics, "a", "found.json")
 
 

@@ -152,5 +152,5 @@ def test_refuses_shapes_and_ranges(weights_file):
     a, b = pair()
     with pytest.raises(ValueError, match="3, H, W"):
         lpips(a.transpose(1, 2, 0), b.transpose(1, 2, 0), weights)
-    with pytest.raises(ValueError, match="zero_one, minus_one_one"):
+    with pytest.raises(ValueError, match="zero_one or minus_one_one"):
         lpips(a, b, weights, "unit")  # type: ignore[arg-type]

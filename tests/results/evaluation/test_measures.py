@@ -260,7 +260,7 @@ def test_a_pair_without_one_baseline_is_not_measured(pair):
 
 
 def test_unknown_measures_are_refused_and_lines_are_plain():
-    with pytest.raises(InputError, match=f"allowed: {', '.join(MEASURES)}"):
+    with pytest.raises(InputError, match=f"use one of {', '.join(MEASURES)}"):
         measured(["beauty"], None, None, "")  # pyright: ignore[reportArgumentType]
     lines = measure_lines(
         {

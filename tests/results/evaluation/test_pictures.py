@@ -77,12 +77,10 @@ def test_a_video_of_renders_is_measured(frames, sequence, tmp_path):
 
 def test_a_video_of_other_frames_is_refused(sequence, tmp_path):
     write_video(tmp_path / "a.mp4", [np.zeros((32, 48, 3), np.uint8)] * 3, 25.0, lossless=True)
-    with pytest.raises(
-        InputError, match=r"a video of 3 pictures; allowed: one for each of the 12 frames or of the 2 held"
-    ):
+    with pytest.raises(InputError, match=r"a video of 3 pictures; use one for each of the 12 frames or of the 2 held"):
         find_renders(tmp_path / "a.mp4", sequence)
     write_video(tmp_path / "b.mp4", [np.zeros((16, 48, 3), np.uint8)] * 2, 25.0, lossless=True)
-    with pytest.raises(InputError, match=r"a picture of 48x16; allowed: a picture of 48x32"):
+    with pytest.raises(InputError, match=r"a picture of 48x16; use a picture of 48x32"):
         measure_pictures(find_renders(tmp_path / "b.mp4", sequence), sequence)
 
 
@@ -110,7 +108,7 @@ def test_files_are_paired_with_frames(names, first, second, words, sequence, tmp
     ("names", "said"),
     [
         (None, "folder of pictures, or video, not found"),
-        ([], "contains no picture; allowed: one file per frame, .npy, .png, .tif, .tiff, .bmp"),
+        ([], "contains no picture; use one file per frame, .npy, .png, .tif, .tiff, .bmp"),
         (["a.png", "b.png"], "cannot be paired"),
         (["1.png", "2.png", "3.png"], "3 .png files cannot be paired with the 2 held-out frames (simulated-000001, "),
     ],
@@ -125,11 +123,11 @@ def test_folders_that_cannot_be_paired_are_refused(names, said, sequence, tmp_pa
 @pytest.mark.parametrize(
     ("array", "said"),
     [
-        (np.zeros((3, 32, 47), np.float32), "a picture of 47x32; allowed: a picture of 48x32"),
-        (np.zeros((32, 48, 3), np.uint8), "uint8; allowed: an array of float32 or float64"),
-        (np.full((3, 32, 48), 128.0), "128; allowed: display units, from 0 to 1"),
+        (np.zeros((3, 32, 47), np.float32), "a picture of 47x32; use a picture of 48x32"),
+        (np.zeros((32, 48, 3), np.uint8), "uint8; use an array of float32 or float64"),
+        (np.full((3, 32, 48), 128.0), "128; use display units, from 0 to 1"),
         (np.full((3, 32, 48), np.nan), "not finite"),
-        (np.linspace(-1, 1, 3 * 32 * 48).reshape(3, 32, 48), "value -1; allowed: display units, from 0 to 1"),
+        (np.linspace(-1, 1, 3 * 32 * 48).reshape(3, 32, 48), "value -1; use display units, from 0 to 1"),
         (b"not an array", "not a plain NumPy array file"),
     ],
 )

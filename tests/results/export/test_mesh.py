@@ -105,7 +105,7 @@ def test_the_vertices_lie_on_the_rendered_depth():
         (Content("mesh", voxel=1e-6), "--voxel 1e-06 is not allowed"),
         (Content("mesh", voxel=-1.0), "--voxel -1 is not allowed"),
         (Content("mesh", voxel=float("nan")), "--voxel nan is not allowed"),
-        (Content("mesh", voxel=1e3), "no surface in a grid of .* voxels of side 1e.03; allowed: a smaller --voxel"),
+        (Content("mesh", voxel=1e3), "no surface in a grid of .* voxels of side 1e.03; use a smaller --voxel"),
         (Content("points", voxel=1.0), "with --content mesh"),
     ],
 )

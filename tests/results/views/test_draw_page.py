@@ -208,7 +208,7 @@ def test_the_page_needs_nothing_else():
     assert not re.search(r'(src|href)\s*=\s*"(?!data:)|https?://|import\s*\(|@import|fetch\(', text)
     about = json.loads(html.unescape(re.search(r'id="about">(.*?)</script>', text, re.S)[1]))
     assert about["command"] == "run <it>" and about["frames"][1]["ahead"]["x"][0] == SHIFT[0]
-    with pytest.raises(InputError, match=r"allowed: a name that ends in \.html"):
+    with pytest.raises(InputError, match=r"use a name that ends in \.html"):
         check_draw_page(Path("draw.png"))
 
 

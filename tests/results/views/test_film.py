@@ -66,7 +66,7 @@ def test_a_film_without_a_picture_is_refused_and_leaves_nothing(ending, tmp_path
 
 @pytest.mark.parametrize(
     ("name", "rate", "said"),
-    [("a.avi", 10, "allowed: a name that ends in .mp4"), ("a", 10, "not a film"), ("a.mp4", 0, "--rate 0"),
+    [("a.avi", 10, "use a name that ends in .mp4"), ("a", 10, "not a film"), ("a.mp4", 0, "--rate 0"),
      ("a.gif", 60, "0.1 to 50"), ("a.mp4", float("nan"), "--rate nan")],
 )  # fmt: skip
 def test_names_and_rates_that_no_film_has_are_refused(name, rate, said, tmp_path):
@@ -101,9 +101,9 @@ def test_the_speed_of_a_film_is_said():
 
 @pytest.mark.parametrize(
     ("times", "duration", "slow", "said"),
-    [([0, 0.5], 0.0, 2.0, "rate is unknown; allowed: --rate"), ([0.5, 0], 2.0, 2.0, "not in order of time"),
+    [([0, 0.5], 0.0, 2.0, "rate is unknown; use --rate"), ([0.5, 0], 2.0, 2.0, "not in order of time"),
      ([0.5], 2.0, 2.0, "one picture has no speed"),
-     ([0, 0.5], 2.0, 100.0, "--slow 100 gives 0.01 pictures per second; allowed: --slow from 0.00833 to 10 with 2")],
+     ([0, 0.5], 2.0, 100.0, "--slow 100 gives 0.01 pictures per second; use --slow from 0.00833 to 10 with 2")],
 )  # fmt: skip
 def test_a_speed_that_no_film_can_have_is_refused(times, duration, slow, said):
     with pytest.raises(InputError) as refused:
@@ -180,7 +180,7 @@ def test_an_mp4_is_h264_where_there_is_an_encoder_and_vp9_otherwise(tmp_path, mo
     write_film(tmp_path / "b.mp4", pictures(2), 10.0)
     assert video_facts(tmp_path / "b.mp4").codec == "vp9"
     monkeypatch.setitem(film_file.BY_ENDING, ".mp4", (film_file.Encoder("none_of_these", {}),))
-    with pytest.raises(InputError, match=r"no encoder for it \(none_of_these\); allowed: a name in .gif"):
+    with pytest.raises(InputError, match=r"no encoder for it \(none_of_these\); use a name in .gif"):
         write_film(tmp_path / "c.mp4", pictures(2), 10.0)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.mp4", "b.mp4"]
 

@@ -111,7 +111,7 @@ def test_the_page_is_one_file_without_a_network(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "keys", "said"),
-    [("a.mp4", 8, "allowed: a name that ends in .html"), ("a", 8, "not a page"), ("a.html", 1, "--keys 1"),
+    [("a.mp4", 8, "use a name that ends in .html"), ("a", 8, "not a page"), ("a.html", 1, "--keys 1"),
      ("a.html", 129, "an integer from 2 to 128")],
 )  # fmt: skip
 def test_names_that_are_no_page_are_refused(name, keys, said, tmp_path):

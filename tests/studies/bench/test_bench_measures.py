@@ -79,7 +79,7 @@ def test_a_stage_ends_when_its_work_fails():
     with watch.iteration():
         with pytest.raises(ZeroDivisionError):
             timed(watch, "binning", lambda: 1 // 0)()
-        with pytest.raises(KeyError, match=r"unknown stage 'sorting'; allowed: FDM, .*density control"):
+        with pytest.raises(KeyError, match=r"unknown stage 'sorting'; use one of FDM, .*density control"):
             timed(watch, "sorting", lambda: None)()
         time.sleep(0.01)
     assert watch.repeats[0][clock.REST] > watch.repeats[0]["binning"]

@@ -100,8 +100,8 @@ def test_a_pair_with_different_input_or_without_its_hash_is_refused(done, tmp_pa
 @pytest.mark.parametrize(
     "words, said",
     [(["--seeds", "0"], "--seeds 0 is not allowed"), (["--iterations", "1"], "--iterations 1 is not allowed"),
-     (["--configurations", "B"], "'B' is not allowed; allowed: base, A, S, L"),
-     (["--splits", "middle"], "splits = 'middle' is not allowed"), (["--measures", "beauty"], "allowed: depth")],
+     (["--configurations", "B"], "'B' is not allowed; use one of base, A, S, L"),
+     (["--splits", "middle"], "splits = 'middle' is not allowed"), (["--measures", "beauty"], "use one of depth")],
 )  # fmt: skip
 def test_mistakes_are_one_line(tmp_path, capsys, words, said):
     assert main(["ablate", "simulated", "--out", str(tmp_path / "out"), *words]) == 2

@@ -76,20 +76,20 @@ def test_a_killed_worker_loses_nothing_and_results_equal_the_local_pool(cluster,
 
 
 def test_no_scheduler_is_one_line(capsys, tmp_path):
-    assert f"{NOWHERE}: no Dask scheduler answers; allowed: " in refused(capsys, tmp_path, NOWHERE)
+    assert f"{NOWHERE}: no Dask scheduler answers; use " in refused(capsys, tmp_path, NOWHERE)
 
 
 def test_a_worker_of_another_version_is_one_line(cluster, capsys, tmp_path):
     (tmp_path / "other_version.py").write_text("import endotsr\nendotsr.__version__ = '9.9'\n")
     cluster.worker("other", "--preload", str(tmp_path / "other_version.py"))
     said = refused(capsys, tmp_path, cluster.address)
-    assert "endotsr 9.9 (here " in said and "allowed: those of this machine" in said
+    assert "endotsr 9.9 (here " in said and "use those of this machine" in said
     assert not list((tmp_path / "out" / "runs").iterdir())
 
 
 def test_a_worker_that_takes_several_runs_is_one_line(cluster, capsys, tmp_path):
     cluster.worker("wide", "--nthreads", "3")
-    assert "has 3 threads; allowed: --nthreads 1" in refused(capsys, tmp_path, cluster.address)
+    assert "has 3 threads; use --nthreads 1" in refused(capsys, tmp_path, cluster.address)
 
 
 def test_no_scheduler_option_without_dask_is_one_line(capsys, tmp_path, monkeypatch):

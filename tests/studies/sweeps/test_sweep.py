@@ -195,7 +195,7 @@ def test_a_finished_run_of_other_settings_is_refused(whole, before, after, said)
     spec, out, _, _ = whole
     other = spec.parent / "other.toml"
     other.write_text(spec.read_text().replace(before, after))
-    with pytest.raises(InputError, match=rf"{said}; allowed: .* another --out"):
+    with pytest.raises(InputError, match=rf"{said}; use .* another --out"):
         sweep(other, out)
 
 

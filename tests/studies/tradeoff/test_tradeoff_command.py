@@ -54,11 +54,11 @@ def test_budget_reads_the_measurement(measured, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--budget", "soon"], 'allowed: a time per frame ("10 ms"'),
+        (["--budget", "soon"], 'use a time per frame ("10 ms"'),
         (["--budget", "1 us"], "in its upper quartile; the smallest is of"),
-        (["--budget", "5 min"], 'allowed: a time per frame ("10 ms"'),
+        (["--budget", "5 min"], 'use a time per frame ("10 ms"'),
         (["--run", "a", "--splats", "b"], "--run with --splats: both state the scene"),
-        (["--scale", "0"], "allowed: a number > 0"),
+        (["--scale", "0"], "use a number > 0"),
         (
             ["--run", "other", "--budget", "1/255"],
             "--run has no effect with the folder with a measurement: --budget chooses from it",
@@ -67,7 +67,7 @@ def test_budget_reads_the_measurement(measured, capsys):
             ["--scale", "0.5", "--budget", "1/255"],
             "--scale has no effect with the folder with a measurement: --budget chooses from it; another --out makes",
         ),
-        (["--threads", "-1", "--out", "new"], "--threads -1 is not allowed; allowed: 0 (all cores) or more"),
+        (["--threads", "-1", "--out", "new"], "--threads -1 is not allowed; use 0 (all cores) or more"),
     ],
 )
 def test_mistakes(measured, capsys, words, said):
@@ -131,7 +131,7 @@ def test_recorded_measurements_are_whole(file):
 
 def test_mistakes_of_a_study_of_training(tmp_path):
     for words, said in (
-        (["--minutes", "0"], "allowed: --minutes > 0"),
+        (["--minutes", "0"], "use --minutes > 0"),
         (["--iterations", "0"], "--iterations >= 1"),
         ([], "not found"),
     ):

@@ -71,7 +71,7 @@ def test_nothing_is_followed_across_a_cut(tmp_path):
     assert np.isfinite(found[0]).all() and np.isnan(found[1]).all()
     with pytest.raises(InputError, match="no window covers"):
         followed(cut, np.zeros((3, 1)), 4, [29])
-    with pytest.raises(InputError, match="allowed: windows with seams"):
+    with pytest.raises(InputError, match="use windows with seams"):
         seam_errors(cut, lambda g: np.ones((40, 48), bool), lambda g, other: np.zeros((3, 40, 48)))
 
 

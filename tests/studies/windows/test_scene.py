@@ -218,7 +218,7 @@ def test_one_time_is_exported_and_what_holds_one_set_of_gaussians_is_refused(col
     assert main(["export", str(cold_run), "--out", str(tmp_path / "model.npz")]) == 2
     assert str(cold_run / "windows" / "000") in capsys.readouterr().err
     assert main(["tradeoff", "--run", str(cold_run), "--out", str(tmp_path / "tradeoff")]) == 2
-    assert f"allowed: a window, such as {cold_run / 'windows' / '000'}" in capsys.readouterr().err
+    assert f"use a window, such as {cold_run / 'windows' / '000'}" in capsys.readouterr().err
     assert main(["export", str(cold_run / "windows" / "000"), "--out", str(tmp_path / "model.npz")]) == 0
 
 

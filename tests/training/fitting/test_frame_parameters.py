@@ -269,7 +269,7 @@ def test_one_of_the_two_arrays_alone_is_refused(disturbed, tmp_path):
     for named in (state.adam.first, state.adam.second, state.adam.step):
         del named["pose_translation"]
     save_state(tmp_path / "a.npz", state, config)
-    with pytest.raises(InputError, match="pose_rotation, pose_translation: some are missing; allowed: all 2 or none"):
+    with pytest.raises(InputError, match="pose_rotation, pose_translation: some are missing; use all 2 or none"):
         load_checkpoint(tmp_path / "a.npz")
 
 

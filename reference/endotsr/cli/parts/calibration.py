@@ -53,5 +53,5 @@ def _refuse_fixed(replaced: list[str], run_path: Path) -> None:
     fixed = [line for line in replaced if not line.split(" = ")[0].startswith(REPLACEABLE)]
     if fixed:
         raise InputError(
-            f"--calibrate-only: {', '.join(fixed)}: fixed by the run {run_path}; allowed: {', '.join(REPLACEABLE)}"
+            f"--calibrate-only: {', '.join(fixed)}: fixed by the run {run_path}; use one of {', '.join(REPLACEABLE)}"
         )

@@ -106,7 +106,7 @@ def compare_methods(asked: EvaluateOptions) -> None:
     from endotsr.results.report.comparison import METRICS, comparison_csv, comparison_table
 
     if asked.seed < 0:
-        raise InputError(f"evaluate: --seed {asked.seed} is not allowed; allowed: an integer >= 0")
+        raise InputError(f"evaluate: --seed {asked.seed} is not allowed; use an integer >= 0")
     named = [_named(word) for word in asked.methods]
     methods, sequence = [], None
     for label, path in named:

@@ -25,7 +25,7 @@ def kept(words: list[str]) -> list[str]:
     Raises: InputError for another word, and for a folder that cannot be removed.
     """
     if words not in ([], [CLEAR]):
-        raise InputError(f"--cache {' '.join(words)!r} is not allowed; allowed: --cache alone, or --cache {CLEAR}")
+        raise InputError(f"--cache {' '.join(words)!r} is not allowed; use --cache alone, or --cache {CLEAR}")
     folder, other, flows = Path(user_cache_dir("endotsr")) / "kernels", os.environ.get("NUMBA_CACHE_DIR"), flow_folder()
     versions = sorted(path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
     lines = [_line(folder, f"compiled kernels of {len(versions)} versions of this package", versions)]

@@ -48,7 +48,7 @@ def base_settings(words: list[str]) -> tuple[Config, str]:
     if sources.iterations is None:
         return config, ""
     if sources.iterations < 1:
-        raise InputError(f"--iterations {sources.iterations} is not allowed; allowed: an integer >= 1")
+        raise InputError(f"--iterations {sources.iterations} is not allowed; use an integer >= 1")
     before = config.training.iterations
     if sources.schedule == "absolute":
         note = f"schedule: {sources.iterations} iterations, milestones at their absolute iterations"

@@ -43,7 +43,7 @@ def split_output(words: list[str]) -> tuple[OutputOptions, list[str]]:
         else:
             rest.append(word)
     if file is not None and file in {Path(word.partition("=")[2] or word) for word in rest}:
-        raise InputError(f"--log-file {file}: the command names this file elsewhere too; allowed: another name")
+        raise InputError(f"--log-file {file}: the command names this file elsewhere too; use another name")
     return OutputOptions(quiet, file), rest
 
 

@@ -208,8 +208,8 @@ def converted(kind: Any, word: str) -> Any:
 def _refused(field: Field, word: str) -> InputError:
     allowed = allowed_values(field.item) + _written_out(field, word)
     if field.in_section:
-        return InputError(f"command line: {field.key} = {word!r} is not allowed; allowed: {allowed}")
-    return InputError(f"{field.name} {word!r} is not allowed; allowed: {allowed}")
+        return InputError(f"command line: {field.key} = {word!r} is not allowed; use {allowed}")
+    return InputError(f"{field.name} {word!r} is not allowed; use {allowed}")
 
 
 def _written_out(field: Field, word: str) -> str:

@@ -43,9 +43,9 @@ def plan_windows(source: str, out: Path, config: Config, windows: str, overlap: 
     from endotsr.studies.windows.plan import Wanted
 
     if source in ("", SIMULATED):
-        raise InputError("train: --windows needs a sequence folder; allowed: a folder of `prepare` or `simulate`")
+        raise InputError("train: --windows needs a sequence folder; use a folder of `prepare` or `simulate`")
     if windows != AUTO and not (windows.isascii() and windows.isdecimal()):
-        raise InputError(f"train: --windows {windows!r} is not allowed; allowed: auto, or a number of frames")
+        raise InputError(f"train: --windows {windows!r} is not allowed; use auto, or a number of frames")
     refuse_inside(out, Path(source), "the sequence")
     print(f"reading every frame of {source} once", flush=True)
     wanted = Wanted(None if windows == AUTO else int(windows), overlap, chain)

@@ -51,7 +51,7 @@ def inspect_sequence(sequence: Sequence, frame_rate: float | None = None) -> Ins
     Equal sequences give equal verdicts: the simulated null has a fixed seed.
     """
     if frame_rate is not None and not 0.0 < frame_rate < float("inf"):
-        raise InputError(f"frame rate {frame_rate:g} is not allowed; allowed: a number > 0, frames per second")
+        raise InputError(f"frame rate {frame_rate:g} is not allowed; use a number > 0, frames per second")
     frame_rate = sequence.frame_rate if frame_rate is None else frame_rate
     clip = reduced_frames(sequence)
     noise = estimate_noise(sequence, clip)

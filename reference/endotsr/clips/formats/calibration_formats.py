@@ -72,7 +72,7 @@ def distortion_of(numbers: FloatArray, where: str) -> tuple[float, ...]:
     while len(values) > 4 and values[-1] == 0 and len(values) not in (5, 8):
         values.pop()
     if len(values) not in (0, 4, 5, 8):
-        raise InputError(f"{where}: {len(values)} distortion coefficients; allowed: none, 4, 5 or 8")
+        raise InputError(f"{where}: {len(values)} distortion coefficients; use none, 4, 5 or 8")
     return tuple(values)
 
 
@@ -95,7 +95,7 @@ def read_stereo_ini(path: Path, keys: Keys) -> StoredCalibration | None:
         raise InputError(f"{path}: not a calibration in ini form: {str(error).splitlines()[0]}") from None
     for section in ("StereoLeft", "StereoRight"):
         if section not in parser:
-            raise InputError(f"{path}: section [{section}] is missing; allowed: StereoLeft and StereoRight")
+            raise InputError(f"{path}: section [{section}] is missing; use StereoLeft and StereoRight")
     sections = ("StereoLeft", "StereoRight")
     notes = [note for name in sections for note in INI.noted(dict(parser[name]), f"{path}: [{name}]")]
     left, right = (_ini_camera(parser, section, path) for section in sections)
@@ -109,7 +109,7 @@ def _ini_camera(parser: configparser.ConfigParser, section: str, path: Path) -> 
     fx, fy, cx, cy = (_ini_number(parser, section, key, path) for key in ("fc_x", "fc_y", "cc_x", "cc_y"))
     width, height = (_ini_number(parser, section, key, path) for key in ("res_x", "res_y"))
     if width < 1 or height < 1 or width % 1 or height % 1:
-        raise InputError(f"{path}: [{section}] res_x = {width:g}, res_y = {height:g}: allowed: whole numbers > 0")
+        raise InputError(f"{path}: [{section}] res_x = {width:g}, res_y = {height:g}: use whole numbers > 0")
     count = max((k + 1 for k in range(COEFFICIENTS) if f"kc_{k}" in parser[section]), default=0)
     given = [_ini_number(parser, section, f"kc_{k}", path) for k in range(count)]
     distortion = distortion_of(np.array(given), f"{path}: [{section}] kc_0 .. kc_{COEFFICIENTS - 1}")
@@ -124,7 +124,7 @@ def _ini_number(parser: configparser.ConfigParser, section: str, key: str, path:
     except ValueError:
         value = float("nan")
     if not np.isfinite(value):
-        raise InputError(f"{path}: [{section}] {key} = {parser[section][key]!r} is not allowed; allowed: a number")
+        raise InputError(f"{path}: [{section}] {key} = {parser[section][key]!r} is not allowed; use a number")
     return value
 
 
@@ -161,7 +161,7 @@ def read_matrix(path: Path) -> FloatArray:
         numbers = np.zeros(0)
     if numbers.size not in (9, 12) or not np.isfinite(numbers).all() or decimal_commas(text):
         raise InputError(
-            f"{path}: {len(words)} words; allowed: a camera matrix of 3x3 or 3x4 finite numbers{decimal_commas(text)}"
+            f"{path}: {len(words)} words; use a camera matrix of 3x3 or 3x4 finite numbers{decimal_commas(text)}"
         )
     rows = numbers.reshape(3, -1)
     if rows.shape[1] == 4 and rows[:, 3].any():
@@ -172,7 +172,7 @@ def read_matrix(path: Path) -> FloatArray:
 def _checked_matrix(rows: FloatArray, path: Path) -> FloatArray:
     """K (3, 3). Raises InputError unless it has the zeros of a camera matrix."""
     if (rows[2] != (0, 0, 1)).any() or rows[1, 0] != 0:
-        raise InputError(f"{path}: allowed: rows `fx 0 cx`, `0 fy cy`, `0 0 1`")
+        raise InputError(f"{path}: use rows `fx 0 cx`, `0 fy cy`, `0 0 1`")
     return rows
 
 
@@ -184,7 +184,7 @@ def read_kalibr(path: Path, keys: Keys) -> StoredCalibration | None:
     if not isinstance(keys.get("cam0"), dict):
         return None
     if not isinstance(keys.get("cam1", {}), dict):
-        raise InputError(f"{path}: cam1: allowed: the fields of a camera, as of cam0")
+        raise InputError(f"{path}: cam1: use the fields of a camera, as of cam0")
     left = _kalibr_camera(path, keys["cam0"], "cam0")
     notes = [note for name in ("cam0", "cam1") for note in KALIBR.noted(keys.get(name) or {}, f"{path}: {name}")]
     if more := sorted(set(keys) - {"cam0", "cam1"}):
@@ -201,12 +201,12 @@ def _kalibr_camera(path: Path, keys: Keys, name: str) -> StoredIntrinsics:
     where = f"{path}: {name}"
     for key, allowed in KALIBR_MODELS.items():
         if keys.get(key, allowed[0]) not in allowed:
-            raise InputError(f"{where}: {key} {keys[key]!r} is not allowed; allowed: {', '.join(allowed)}")
+            raise InputError(f"{where}: {key} {keys[key]!r} is not allowed; use one of {', '.join(allowed)}")
     fx, fy, cx, cy = matrix(keys.get("intrinsics"), f"{where}: intrinsics", (4,))
     given = matrix(keys.get("distortion_coeffs", [0.0] * 4), f"{where}: distortion_coeffs", (-1,))
     width, height = matrix(keys.get("resolution"), f"{where}: resolution", (2,))
     if min(width, height) < 1 or width % 1 or height % 1:
-        raise InputError(f"{where}: resolution: allowed: two whole numbers > 0")
+        raise InputError(f"{where}: resolution: use two whole numbers > 0")
     found = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
     return StoredIntrinsics(found, distortion_of(given, where), (int(width), int(height)))
 
@@ -232,7 +232,9 @@ def read_ros(path: Path, keys: Keys) -> StoredCalibration | None:
              for k, f in zip((left, right), files)]  # fmt: skip
     projection = matrix(right.get(ROS_MARK), f"{files[1]}: {ROS_MARK}", (3, 4))
     if projection[0, 3] >= 0:
-        raise InputError(f"{files[1]}: {ROS_MARK}: Tx = {projection[0, 3]:g}; allowed: below 0, -fx times the baseline")
+        raise InputError(
+            f"{files[1]}: {ROS_MARK}: Tx = {projection[0, 3]:g}; use a number below 0, -fx times the baseline"
+        )
     across = np.array([1000.0 * projection[0, 3] / projection[0, 0], 0.0, 0.0])
     cameras = _ros_camera(files[0], left), _ros_camera(files[1], right)
     return StoredCalibration(*cameras, turns[1].T @ turns[0], turns[1].T @ across, notes=(*notes, *more))
@@ -261,10 +263,10 @@ def _ros_keys(keys: Keys, path: Path) -> tuple[Keys, list[str]]:
 def _ros_camera(path: Path, keys: Keys) -> StoredIntrinsics:
     model = keys.get("distortion_model", ROS_MODELS[0])
     if model not in ROS_MODELS:
-        raise InputError(f"{path}: distortion_model {model!r} is not allowed; allowed: {', '.join(ROS_MODELS)}")
+        raise InputError(f"{path}: distortion_model {model!r} is not allowed; use one of {', '.join(ROS_MODELS)}")
     size = keys.get("image_width"), keys.get("image_height")
     if not all(isinstance(side, int) and side > 0 for side in size):
-        raise InputError(f"{path}: image_width and image_height: allowed: whole numbers > 0")
+        raise InputError(f"{path}: image_width and image_height: use whole numbers > 0")
     found = matrix(keys.get("camera_matrix"), f"{path}: camera_matrix", (3, 3))
     given = matrix(keys.get("distortion_coefficients"), f"{path}: distortion_coefficients", (-1,))
     return StoredIntrinsics(found, distortion_of(given, f"{path}: distortion_coefficients"), (size[0], size[1]))  # type: ignore[arg-type]

@@ -38,7 +38,7 @@ def read_calibration(path: Path) -> StoredCalibration:
         if found is not None:
             return found
     known = "; ".join(entry.about for entry in FORMATS)
-    raise InputError(f"{path}: no calibration that is known here; allowed: {known}")
+    raise InputError(f"{path}: no calibration that is known here; use {known}")
 
 
 SAME_SHAPE = 0.02  # relative difference of proportions
@@ -74,7 +74,7 @@ def calibrated(path: Path, width: int, height: int) -> StatedCamera:
         return StatedCamera(left, baseline=found.baseline, notes=tuple(notes))
     rotation = checked_rotation(found.rotation, f"{path}: rotation between the cameras")
     if not np.isfinite(found.translation).all() or not found.translation.any():
-        raise InputError(f"{path}: both cameras are in one place; allowed: a translation between them")
+        raise InputError(f"{path}: both cameras are in one place; use a translation between them")
     pair = StereoCalibration(left, intrinsics(found.right, "right"), rotation, found.translation)
     return StatedCamera(calibration=pair, notes=tuple(notes))
 

@@ -18,7 +18,7 @@ LARGEST_SIDE = 1 << 16  # pixels of a stated picture
 LEAST_VIEW, MOST_VIEW = 1, 170  # degrees, of `--field-of-view`
 SPREAD = 0.003  # of the focal length: 1 px at the border of a picture of 640 px; of the picture; of a coefficient
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
-ROTATIONS = "allowed: the matrix of a rotation, of determinant 1"
+ROTATIONS = "use the matrix of a rotation, of determinant 1"
 # x right, y down, z forward; x right, y up, z backward; x down, y right, z backward. x_opencv = AXES[name] @ x_name.
 AXES = {
     "opencv": np.eye(3),
@@ -140,12 +140,12 @@ def intrinsics_of_matrix(
     """
     numbers = np.asarray(matrix, np.float64)
     if numbers.shape != (3, 3) or not np.isfinite(numbers).all():
-        raise InputError(f"{where}: camera matrix: allowed: 3x3 finite numbers")
+        raise InputError(f"{where}: camera matrix: use 3x3 finite numbers")
     if (numbers[2] != (0, 0, 1)).any() or numbers[1, 0] != 0:
         last = " ".join(f"{value:g}" for value in numbers[2])
         raise InputError(f"{where}: camera matrix: the last row is {last}; use 0 0 1: is the matrix transposed?")
     if numbers[0, 1] != 0:
-        raise InputError(f"{where}: camera matrix: skew {numbers[0, 1]:g}; allowed: 0 (square angles)")
+        raise InputError(f"{where}: camera matrix: skew {numbers[0, 1]:g}; use 0 (square angles)")
     fx, fy, cx, cy = (
         float(value) for value in (numbers[0, 0], numbers[1, 1], numbers[0, 2] + 0.5, numbers[1, 2] + 0.5)
     )
@@ -162,16 +162,16 @@ def checked_intrinsics(found: Intrinsics, where: object) -> Intrinsics:
     if max(width, height) > LARGEST_SIDE:
         raise InputError(f"{where}: states a picture of more than {LARGEST_SIDE} pixels on a side; state its true size")
     if not np.isfinite([fx, fy, cx, cy, *distortion]).all():
-        raise InputError(f"{where}: camera: allowed: finite numbers, got {found[:4]} and distortion {distortion}")
+        raise InputError(f"{where}: camera: use finite numbers, got {found[:4]} and distortion {distortion}")
     if fx <= 0 or fy <= 0:
-        raise InputError(f"{where}: focal length {min(fx, fy):g}: allowed: numbers > 0")
+        raise InputError(f"{where}: focal length {min(fx, fy):g}: use numbers > 0")
     if not -width <= cx <= 2 * width or not -height <= cy <= 2 * height:
         raise InputError(
             f"{where}: principal point ({cx:g}, {cy:g}) is far outside the {width}x{height} pixels; is the calibration"
             " of another picture size?"
         )
     if len(distortion) not in (0, 4, 5, 8):
-        raise InputError(f"{where}: {len(distortion)} distortion coefficients; allowed: none, 4, 5 or 8")
+        raise InputError(f"{where}: {len(distortion)} distortion coefficients; use none, 4, 5 or 8")
     return found
 
 

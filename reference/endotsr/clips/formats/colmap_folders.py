@@ -58,7 +58,7 @@ def choose_model(path: Path, name: str = "") -> ChosenModel:
         wanted = name.replace("\\", "/").strip("/")
         found = next((folder for folder in models if wanted in (names[folder], folder.name)), None)
         if found is None:
-            raise InputError(f"{path}: --model {name}: no such model; allowed: {', '.join(names.values())}")
+            raise InputError(f"{path}: --model {name}: no such model; use one of {', '.join(names.values())}")
     else:
         found = max(models, key=lambda folder: counts[folder])
     others = [f"{names[folder]} ({counted(counts[folder], 'picture')})" for folder in models if folder != found]

@@ -79,7 +79,7 @@ def read_model(folder: Path) -> ColmapModel:
 
 def _intrinsics(name: str, width: int, height: int, values: list[float], where: str) -> Intrinsics:
     if name not in MODELS:
-        raise InputError(f"{where}: camera model {name}: allowed: {', '.join(MODELS)}")
+        raise InputError(f"{where}: camera model {name}: use one of {', '.join(MODELS)}")
     if len(values) != PARAMETERS[name]:
         raise InputError(f"{where}: {len(values)} parameters; {name} has {PARAMETERS[name]}")
     _, (fx, fy, cx, cy), places = MODELS[name]
@@ -95,7 +95,7 @@ def _pose(values: list[float] | FloatArray, where: str) -> CameraPose:
 
     numbers = np.array(values, np.float64)
     if not np.isfinite(numbers).all() or abs(np.linalg.norm(numbers[:4]) - 1) > 1e-2:
-        raise InputError(f"{where}: no pose: allowed: a unit quaternion w x y z and three finite numbers")
+        raise InputError(f"{where}: no pose: use a unit quaternion w x y z and three finite numbers")
     return CameraPose(Rotation.from_quat(numbers[[1, 2, 3, 0]]).as_matrix(), numbers[4:7])
 
 
@@ -120,7 +120,7 @@ def _cameras_text(path: Path) -> dict[int, Intrinsics]:
                 key, width, height = int(words[0]), int(words[2]), int(words[3])
                 values = [float(word) for word in words[4:]]
             except (ValueError, IndexError):
-                raise InputError(f"{where}: allowed: CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS") from None
+                raise InputError(f"{where}: use CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS") from None
             found[key] = _intrinsics(words[1], width, height, values, where)
     return found
 
@@ -140,7 +140,7 @@ def _images_text(path: Path) -> list[ModelImage]:
         try:
             values, camera, name = [float(word) for word in words[1:8]], int(words[8]), words[9].strip()
         except (ValueError, IndexError):
-            raise InputError(f"{where}: allowed: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then points") from None
+            raise InputError(f"{where}: use IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then points") from None
         points = _visible_points(seen, f"{path}: line {number}: the line below it")
         found.append(ModelImage(name, camera, _pose(values, where), points[points >= 0]))
     return found
@@ -156,7 +156,7 @@ def _visible_points(line: str, where: str) -> NDArray[np.int64]:
         numbers = np.array(words, np.float64).reshape(-1, 3)
     except ValueError:
         raise InputError(
-            f"{where}: allowed: X Y POINT3D_ID of each keypoint, or an empty line: every picture has two lines"
+            f"{where}: use X Y POINT3D_ID of each keypoint, or an empty line: every picture has two lines"
         ) from None
     return numbers[:, 2].astype(np.int64)
 
@@ -172,7 +172,7 @@ def _points_text(path: Path) -> dict[int, FloatArray]:
                     raise ValueError
                 found[int(words[0])] = point
             except (ValueError, IndexError):
-                raise InputError(f"{path}: line {number}: allowed: POINT3D_ID X Y Z R G B ERROR TRACK") from None
+                raise InputError(f"{path}: line {number}: use POINT3D_ID X Y Z R G B ERROR TRACK") from None
     return found
 
 
@@ -224,7 +224,7 @@ def _cameras_binary(path: Path) -> dict[int, Intrinsics]:
         key, model, width, height = stream.take("iiQQ")
         where = f"{path}: camera {key}"
         if model not in NUMBERS:
-            raise InputError(f"{where}: camera model number {model}: allowed: {', '.join(MODELS)}")
+            raise InputError(f"{where}: camera model number {model}: use one of {', '.join(MODELS)}")
         values = list(stream.take(f"{PARAMETERS[NUMBERS[model]]}d"))
         found[key] = _intrinsics(NUMBERS[model], width, height, values, where)
     stream.end()
@@ -248,7 +248,7 @@ def _points_binary(path: Path) -> dict[int, FloatArray]:
         key, x, y, z, *_ = stream.take("QdddBBBd")
         stream.take(f"{2 * stream.count(8)}i")
         if not np.isfinite([x, y, z]).all():
-            raise InputError(f"{path}: point {key}: allowed: finite numbers")
+            raise InputError(f"{path}: point {key}: use finite numbers")
         found[key] = np.array([x, y, z])
     stream.end()
     return found

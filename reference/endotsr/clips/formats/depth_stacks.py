@@ -18,7 +18,7 @@ from endotsr.untrusted.matlab import read_mat
 ENDINGS = (".npz", ".npy")
 LARGEST_FILE = 1 << 34  # bytes
 MATLAB = ".mat"  # one frame: MATLAB stores frames last, and others first
-ONE = "allowed: one array of real numbers, (frames, height, width) for a clip or (height, width) for a frame"
+ONE = "use one array of real numbers, (frames, height, width) for a clip or (height, width) for a frame"
 
 
 def stack_planes(path: Path, kinds: str = "fiu") -> list[Path] | None:

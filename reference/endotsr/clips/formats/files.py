@@ -13,7 +13,7 @@ from endotsr.untrusted.names import counted, file_name
 from endotsr.untrusted.png import LARGEST_FILE
 
 TRUTH = "truth"  # folder of a simulated sequence
-ALLOWED_NAMES = "allowed: names in one pattern that differ in the frame number, and no other PNG files"
+ALLOWED_NAMES = "use names in one pattern that differ in the frame number, and no other PNG files"
 
 
 def visible_files(folder: Path, pattern: str = "*") -> list[Path]:
@@ -112,7 +112,7 @@ def _check_names_are_text(files: list[Path]) -> None:
             str(file).encode("utf-8")
         except UnicodeEncodeError:
             shown = os.fsencode(file).decode("utf-8", "backslashreplace")
-            raise InputError(f"{shown}: the name is not UTF-8; allowed: file and folder names in UTF-8") from None
+            raise InputError(f"{shown}: the name is not UTF-8; use file and folder names in UTF-8") from None
         file_name(file.stem, str(file.parent))
 
 
@@ -140,7 +140,7 @@ def _check_decimals(files: list[Path]) -> None:
         if other and (alone or len({whole for whole, _ in column}) > 1):
             raise InputError(
                 f"{files[other]}: another number of decimals than in {files[0].name}: the"
-                " order is ambiguous; allowed: decimals of one length, such as 1.50 and 1.25"
+                " order is ambiguous; use decimals of one length, such as 1.50 and 1.25"
             )
 
 

@@ -46,7 +46,7 @@ def encoder_of(path: Path, lossless: bool = False) -> Encoder:
     found = next((encoder for encoder in wanted if encoder.name in codecs_available and _encodes(encoder.name)), None)
     if found is None:
         names = ", ".join(encoder.name for encoder in wanted)
-        raise InputError(f"{path}: this build of FFmpeg has no encoder for it ({names}); allowed: a name in .gif")
+        raise InputError(f"{path}: this build of FFmpeg has no encoder for it ({names}); use a name in .gif")
     return found
 
 
@@ -78,7 +78,7 @@ def write_video(path: Path, pictures: Iterable[Array], rate: float, lossless: bo
     except av.error.FFmpegError as error:
         if isinstance(error, OSError) and error.errno:
             raise OSError(error.errno, error.strerror, str(path)) from None
-        raise InputError(f"{path}: {encoder.name} cannot encode the film: {error}; allowed: a name in .gif") from None
+        raise InputError(f"{path}: {encoder.name} cannot encode the film: {error}; use a name in .gif") from None
 
 
 def _stream(container: Any, encoder: Encoder, picture: Array, rate: float) -> Any:

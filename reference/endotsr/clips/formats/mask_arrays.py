@@ -33,7 +33,7 @@ def array_plane(path: Path) -> NDArray:
     wrong = ~((plane >= 0) & (plane <= LARGEST) & (plane == np.round(plane)))  # NaN is neither
     if wrong.any():
         raise InputError(
-            f"{path}: holds {plane[wrong][0]:g}; allowed: whole numbers from 0 to {LARGEST}, or True and False;"
+            f"{path}: holds {plane[wrong][0]:g}; use whole numbers from 0 to {LARGEST}, or True and False;"
             f' a threshold makes a mask: numpy.save("{file.stem}.npy", array > 0.5)'
         )
     return plane.astype(np.uint8 if array.dtype.itemsize == 1 else np.uint16)

@@ -105,7 +105,7 @@ def read_matlab(path: Path, keys: Keys) -> StoredCalibration | None:
     if not found:
         return None
     if len(found) > 1:
-        raise InputError(f"{path}: {len(found)} calibrations; allowed: one camera or one pair in a file")
+        raise InputError(f"{path}: {len(found)} calibrations; use one camera or one pair in a file")
     where, one = found[0]
     if "CameraParameters1" not in one:
         left, notes, _ = _camera(one, where)
@@ -131,18 +131,18 @@ def _is_calibration(keys: Any) -> bool:
 def _camera(keys: Any, where: str) -> tuple[StoredIntrinsics, list[str], float]:
     """One camera, notes, and millimetres per unit of length."""
     if not isinstance(keys, dict) or not any(name in keys for name in MARKS):
-        raise InputError(f"{where}: allowed: a struct with IntrinsicMatrix, K, or FocalLength and PrincipalPoint")
+        raise InputError(f"{where}: use a struct with IntrinsicMatrix, K, or FocalLength and PrincipalPoint")
     notes = CAMERA.noted(keys, where)
     found = _matrix_of(keys, where)
     found[:2, 2] -= 1.0  # the first pixel centre is at (1, 1)
     radial = matrix(keys.get("RadialDistortion", [0.0, 0.0]), f"{where}: RadialDistortion", (-1,)).tolist()
     across = matrix(keys.get("TangentialDistortion", [0.0, 0.0]), f"{where}: TangentialDistortion", (2,)).tolist()
     if len(radial) not in (2, 3):
-        raise InputError(f"{where}: RadialDistortion: {len(radial)} numbers; allowed: 2 or 3")
+        raise InputError(f"{where}: RadialDistortion: {len(radial)} numbers; use 2 or 3")
     bent = distortion_of(np.array([*radial[:2], *across, *radial[2:]]), f"{where}: distortion")
     unit = str(keys.get("WorldUnits", "mm")).lower()
     if unit not in UNITS:
-        raise InputError(f"{where}: WorldUnits {unit[:40]!r}; allowed: {', '.join(UNITS)}")
+        raise InputError(f"{where}: WorldUnits {unit[:40]!r}; use one of {', '.join(UNITS)}")
     stated = keys.get("ImageSize")
     size = None if stated is None or not np.size(stated) else matrix(stated, f"{where}: ImageSize", (2,)).astype(int)
     return StoredIntrinsics(found, bent, None if size is None else (int(size[1]), int(size[0]))), notes, UNITS[unit]
@@ -163,9 +163,9 @@ def _matrix_of(keys: Keys, where: str) -> FloatArray:
                                   "PrincipalPoint"))  # fmt: skip
             found.append(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]]))
     if not found:
-        raise InputError(f"{where}: allowed: IntrinsicMatrix, K, or FocalLength and PrincipalPoint")
+        raise InputError(f"{where}: use IntrinsicMatrix, K, or FocalLength and PrincipalPoint")
     if any(np.abs(other - found[0]).max() > SAME * np.abs(found[0]).max() for other in found):
-        raise InputError(f"{where}: IntrinsicMatrix, K, FocalLength and PrincipalPoint differ; allowed: one camera")
+        raise InputError(f"{where}: IntrinsicMatrix, K, FocalLength and PrincipalPoint differ; use one camera")
     return found[0]
 
 

@@ -13,7 +13,7 @@ from endotsr.untrusted.names import counted
 
 LARGEST_FILE = 1 << 32  # bytes
 PFM_HEADER = re.compile(rb"(P[Ff])\s+(\d{1,6})\s+(\d{1,6})\s+(-?\d*\.?\d+(?:[eE][-+]?\d+)?)\s")
-ALLOWED = "allowed: an .npy file of numbers"
+ALLOWED = "use an .npy file of numbers"
 
 
 def read_npy(path: Path, largest: int = LARGEST_FILE, allowed: str = ALLOWED) -> NDArray:
@@ -46,7 +46,7 @@ def read_pfm(path: Path) -> NDArray[np.float32]:
     if abs(scale) != 1.0:
         raise InputError(
             f"{path}: its first lines state the scale factor {abs(scale):g}, which some programs apply and others"
-            " ignore; allowed: 1 or -1, with the values as they are meant"
+            " ignore; use 1 or -1, with the values as they are meant"
         )
     if len(data) - header.end() != 4 * width * height:
         raise InputError(

@@ -44,7 +44,7 @@ def rectified_baseline(left: FloatArray, right: FloatArray, where: str) -> float
     if baseline <= 0 or upwards > UPWARDS * baseline:
         raise InputError(
             f"{where}: the second camera is {baseline:.4g} to the right of the first and {upwards:.4g} above or below"
-            " it; allowed: the left camera first, and a pair side by side"
+            " it; use the left camera first, and a pair side by side"
         )
     return baseline
 

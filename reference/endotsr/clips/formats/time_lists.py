@@ -49,20 +49,19 @@ def nanosecond_list(path: Path, folder: Path, notes: list[str]) -> list[TimedFil
         if not words or words[0].startswith("#") or (not rows and not words[0][0].isdigit()):
             continue
         if len(words) < 2 or not words[0].isdecimal() or len(words[0]) > 19:
-            raise InputError(f"{where}: allowed: nanoseconds (an integer), a comma and the name of a picture")
+            raise InputError(f"{where}: use nanoseconds (an integer), a comma and the name of a picture")
         stamp = int(words[0])
         if stamp in rows:
-            raise InputError(f"{where}: the stamp {stamp} occurs twice; allowed: one line per picture")
+            raise InputError(f"{where}: the stamp {stamp} occurs twice; use one line per picture")
         rows[stamp] = folder / relative_path(words[1], where)
         wider = wider or len(words) > 2
     if not rows:
-        raise InputError(f"{path}: names no picture; allowed: lines of nanoseconds and the name of a picture")
+        raise InputError(f"{path}: names no picture; use lines of nanoseconds and the name of a picture")
     stamps = sorted(rows)
     usual = float(np.median(np.diff(np.array(stamps, np.float64) - stamps[0]))) if len(stamps) > 1 else SHORTEST
     if usual < SHORTEST:
         raise InputError(
-            f"{path}: {1e9 / usual:.3g} pictures a second by its stamps; allowed: stamps in nanoseconds, as EuRoC"
-            " has them"
+            f"{path}: {1e9 / usual:.3g} pictures a second by its stamps; use stamps in nanoseconds, as EuRoC has them"
         )
     if wider:
         notes.append(f"{path.parent.name}/{path.name}: columns after the second are not used")

@@ -97,7 +97,7 @@ def poses_of_frames(
     stamps = trajectory.stamps
     if not trajectory.stamped and len(stamps) != count:
         raise InputError(
-            f"{trajectory.path}: {len(stamps)} poses without stamps for {counted(count, 'frame')}; allowed: one pose"
+            f"{trajectory.path}: {len(stamps)} poses without stamps for {counted(count, 'frame')}; use one pose"
             " per frame"
         )
     if (named := _by_numbers(trajectory, numbers, rate)) is not None:
@@ -114,7 +114,7 @@ def poses_of_frames(
         return list(trajectory.poses), "one pose per frame, in order"
     if rate is None:
         raise InputError(
-            f"{trajectory.path}: {len(stamps)} poses with times for {counted(count, 'frame')}; allowed: one pose per"
+            f"{trajectory.path}: {len(stamps)} poses with times for {counted(count, 'frame')}; use one pose per"
             " frame, frame numbers as stamps, or a known frame rate"
         )
     wanted = timed.stamps[0] + (np.arange(count) / rate if times is None else times)

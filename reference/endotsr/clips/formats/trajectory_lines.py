@@ -20,7 +20,7 @@ from endotsr.untrusted.names import decimal_commas
 
 COLUMNS = (7, 8, 12, 16)
 ALLOWED = (
-    "allowed: 8 finite numbers, stamp tx ty tz qx qy qz qw; without stamps 7, or the 12 or 16 of a matrix, as KITTI has"
+    "use 8 finite numbers, stamp tx ty tz qx qy qz qw; without stamps 7, or the 12 or 16 of a matrix, as KITTI has"
     " them; or other columns that a head line names"
 )
 LONGEST_HEAD = 4096  # characters; the search for brackets takes the square of it
@@ -107,7 +107,7 @@ def _array_lines(path: Path) -> list[tuple[str, list[float]]]:
         raise InputError(f"{path}: array of shape {array.shape}; {ALLOWED}")
     if (lost := np.flatnonzero(~np.isfinite(rows).all(axis=1))).size:
         raise InputError(
-            f"{path}: row {lost[0]}: holds a number that is not finite; such rows: {lost.size} of {len(rows)}; allowed:"
+            f"{path}: row {lost[0]}: holds a number that is not finite; such rows: {lost.size} of {len(rows)}; use"
             " finite numbers; where frames have no pose, a text file with stamps that leaves them out"
         )
     return [(f"{path}: row {i}", row) for i, row in enumerate(rows.tolist())]
@@ -139,7 +139,7 @@ def _text(path: Path) -> str:
     try:
         return read_text(path)
     except InputError as error:
-        raise InputError(f"{error}; allowed: text in UTF-8, or one array in a file that ends in .npy") from None
+        raise InputError(f"{error}; use text in UTF-8, or one array in a file that ends in .npy") from None
 
 
 def _angles(line: str) -> str:
@@ -170,5 +170,5 @@ def _rotation(quaternion: list[float], where: str) -> FloatArray:
 
     length = np.linalg.norm(quaternion)
     if abs(length - 1) > NORM_TOLERANCE:
-        raise InputError(f"{where}: the quaternion has length {length:.4g}; allowed: 1, in the order x y z w")
+        raise InputError(f"{where}: the quaternion has length {length:.4g}; use 1, in the order x y z w")
     return Rotation.from_quat(quaternion).as_matrix()

@@ -105,14 +105,14 @@ def video_facts(path: Path) -> VideoFacts:
     packets = _packets(path)
     if len(packets) < stated:
         raise InputError(
-            f"{path}: the video ends after {len(packets)} of {stated} pictures: it is truncated or damaged; allowed: a"
+            f"{path}: the video ends after {len(packets)} of {stated} pictures: it is truncated or damaged; use a"
             f" whole file (`ffmpeg -i {path.name} -c copy whole{path.suffix}` keeps what is left)"
         )
     stamps, hidden = _stamps(path, packets, by_decoding=interlaced or codec in HIDDEN)
     early = "" if stated else _ends_early(stamps, ends)
     remarks = (*remarks, *filter(None, (hidden, early)))
     if turn % 90:
-        raise InputError(f"{path}: the file states a rotation of {turn} degrees; allowed: 0, 90, 180 and 270")
+        raise InputError(f"{path}: the file states a rotation of {turn} degrees; use 0, 90, 180 and 270")
     clock = clock_of(stamps, rate if np.isfinite(rate) and rate > 0 else None)
     return VideoFacts(width, height, len(stamps), clock, turn, interlaced, codec, shape, remarks, views)
 
@@ -165,7 +165,7 @@ def _refuse_wide_range(frame: Any, path: Path) -> None:
     kind = WIDE_RANGE.get(int(frame.color_trc or 0))
     if kind:
         raise InputError(
-            f"{path}: pictures of high dynamic range ({kind}); allowed: display RGB, for example after a tone mapping"
+            f"{path}: pictures of high dynamic range ({kind}); use display RGB, for example after a tone mapping"
             " by the program that exported the video"
         )
 
@@ -231,12 +231,12 @@ def video_pictures(path: Path, wanted: list[int]) -> Iterator[NDArray[np.uint8]]
                         f"{path}: the video ends after {position + 1} pictures: it is truncated or damaged"
                     )
                 if frame.is_corrupt:
-                    raise InputError(f"{path}: picture {position} is damaged; allowed: a whole file, or other --frames")
+                    raise InputError(f"{path}: picture {position} is damaged; use a whole file, or other --frames")
             size = size or (frame.width, frame.height)
             if (frame.width, frame.height) != size:
                 raise InputError(
                     f"{path}: picture {position}: {frame.width}x{frame.height} pixels, those before have"
-                    f" {size[0]}x{size[1]}; allowed: one size"
+                    f" {size[0]}x{size[1]}; use one size"
                 )
             yield _as_rgb(frame, path, position)
 
@@ -327,7 +327,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
     with open_regular(path, LARGEST_FILE) as file:
         begin = file.read(16)
         if not any(begin.startswith(starts, place) for place, starts in STARTS.items()):
-            raise InputError(f"{path}: not a video by its first bytes; allowed: {', '.join(VIDEO_ENDINGS)}")
+            raise InputError(f"{path}: not a video by its first bytes; use one of {', '.join(VIDEO_ENDINGS)}")
         file.seek(0)
         try:
             options: Any = _metadata_ignored(av.__version__)
@@ -341,6 +341,6 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
                 raise InputError(f"{path}: holds no pictures of a known codec")
             if stream.codec_context.width * stream.codec_context.height > MOST_PIXELS:
                 size = f"{stream.codec_context.width}x{stream.codec_context.height}"
-                raise InputError(f"{path}: pictures of {size} pixels; allowed: at most {MOST_PIXELS}")
+                raise InputError(f"{path}: pictures of {size} pixels; use at most {MOST_PIXELS}")
             stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
             yield container, stream

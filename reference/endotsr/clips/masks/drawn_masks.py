@@ -68,7 +68,7 @@ def read_drawn(path: Path, clip: Clip, width: int, height: int) -> DrawnFile:
     """
     data = read_json(path, LARGEST_FILE)
     if data.get("format") != FORMAT:
-        raise InputError(f"{path}: format: {shown(data.get('format'))} is not allowed; allowed: {FORMAT!r}")
+        raise InputError(f"{path}: format: {shown(data.get('format'))} is not allowed; use {FORMAT!r}")
     found = typed(data, DrawnFile, path)
     for key, value, own in (
         ("frames", found.frames, clip.count),
@@ -80,7 +80,7 @@ def read_drawn(path: Path, clip: Clip, width: int, height: int) -> DrawnFile:
     _check_frames(path, found, clip)
     points = sum(len(shape.points) for shapes in (found.never, *(k.shapes for k in found.keys)) for shape in shapes)
     if points > MOST_POINTS:
-        raise InputError(f"{path}: {points} points; allowed: at most {MOST_POINTS} in one file")
+        raise InputError(f"{path}: {points} points; use at most {MOST_POINTS} in one file")
     return found
 
 
@@ -98,7 +98,7 @@ def _check_frames(path: Path, found: DrawnFile, clip: Clip) -> None:
         if key.frame >= clip.count:
             raise InputError(f"{where}.frame: {key.frame} is not a frame of the clip; use one of 0 to {clip.count - 1}")
         if key.frame in seen:
-            raise InputError(f"{where}.frame: {key.frame} stands twice; allowed: one entry for each frame")
+            raise InputError(f"{where}.frame: {key.frame} stands twice; use one entry for each frame")
         if key.name != clip.names[key.frame]:
             own = shown(clip.names[key.frame])
             raise InputError(f"{where}.name: {shown(key.name)} is not allowed; frame {key.frame} of the clip is {own}")

@@ -16,7 +16,7 @@ from endotsr.clips.sequences.clip import Picture
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray
 
-MEANING = "allowed: white = instrument, black = tissue"
+MEANING = "use white = instrument, black = tissue"
 
 
 def refuse_no_tissue(excluded: Sequence[BoolArray], names: Sequence[str], source: Path, margin: int) -> None:

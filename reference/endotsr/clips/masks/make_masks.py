@@ -49,7 +49,7 @@ def _proposed(clip: Clip) -> Proposal:
     if len(empty) > MOST_WITHOUT * clip.count:
         raise InputError(
             f"{clip.where}: the proposed masks leave hardly any tissue in {len(empty)} of {clip.count}"
-            f" frames: {shortened(empty)}; allowed: masks of another program (prepare --masks)"
+            f" frames: {shortened(empty)}; use masks of another program (prepare --masks)"
         )
     return proposal
 
@@ -171,7 +171,7 @@ def enter_masks(folder: Path, replace: bool = False, propose: Propose | None = N
     clip = describe_prepared(folder)
     static = None if replace else _static_mask(clip)
     if (clip.masks or (folder / MASKS).exists()) and not replace and static is None:
-        raise InputError(f"{folder}: has masks already; allowed: --replace, or --out FOLDER")
+        raise InputError(f"{folder}: has masks already; use --replace, or --out FOLDER")
     proposal = (propose or _proposed)(clip)
     if proposal.found and static is not None:
         united = [plane | static for plane in proposal.excluded]

@@ -54,7 +54,7 @@ def read_picture(path: Path) -> Array:
         _check_turn(marks_of(data).get("Orientation") or 1, path)
         return pixels
     if ending not in KINDS:
-        raise InputError(f"{path}: no picture by its name; allowed: {', '.join(PICTURE_ENDINGS)}")
+        raise InputError(f"{path}: no picture by its name; use a name that ends in one of {', '.join(PICTURE_ENDINGS)}")
     data = read_bytes(Path(path), LARGEST_FILE)
     kind = _check_start_and_end(data, ending, path)
     pixels = _by_pillow(data, kind, path)
@@ -114,7 +114,7 @@ def _by_pillow(data: bytes, kind: str, path: Path) -> Array | None:
             _check_one_upright(picture, path)
             if kind == "TIFF":
                 if picture.mode in NOT_DECODED:
-                    raise InputError(f"{path}: a TIFF of the mode {picture.mode}; allowed: grey, palette, RGB, CMYK")
+                    raise InputError(f"{path}: a TIFF of the mode {picture.mode}; use grey, palette, RGB, CMYK")
                 _check_white(picture, path)
                 return None
             if picture.mode in GREY:
@@ -127,7 +127,7 @@ def _by_pillow(data: bytes, kind: str, path: Path) -> Array | None:
         if "unknown pixel mode" in str(error) and kind == "TIFF":
             raise InputError(
                 f"{path}: a TIFF of a kind that is not read, such as colours of floating-point numbers, or numbers of"
-                " 16 or 64 bits with a point; allowed: whole numbers of 8 or 16 bits, or one channel of floating-point"
+                " 16 or 64 bits with a point; use whole numbers of 8 or 16 bits, or one channel of floating-point"
                 f" numbers of 32 bits; of frames, {scaled()}"
             ) from None
         raise InputError(f"{path}: damaged {kind}: {plain_line(str(error))}") from None
@@ -148,27 +148,27 @@ def _check_white(picture: Any, path: Path) -> None:
     if picture.tag_v2.get(TIFF_PHOTOMETRIC) == ZERO_IS_WHITE and max(bits) > 8:
         raise InputError(
             f"{path}: states that 0 is white (PhotometricInterpretation 0): its numbers are inverted where it is shown;"
-            " allowed: 0 is black, as most programs store it"
+            " store 0 as black, as most programs do"
         )
 
 
 def _check_one_upright(picture: Any, path: Path) -> None:
     _check_turn(picture.getexif().get(ORIENTATION, 1), path)
     if getattr(picture, "n_frames", 1) != 1:
-        raise InputError(f"{path}: holds {picture.n_frames} pictures; allowed: one picture per file")
+        raise InputError(f"{path}: holds {picture.n_frames} pictures; use one picture per file")
 
 
 def _check_turn(turn: int, path: Path) -> None:
     if turn not in (0, 1):
         raise InputError(
             f"{path}: its EXIF data rotate the picture (orientation {turn}), but a calibration may not;"
-            " allowed: pictures stored in the orientation in which they are shown"
+            " use pictures stored in the orientation in which they are shown"
         )
 
 
 def _check_size(size: tuple[int, int], path: Path) -> None:
     if not 0 < size[0] * size[1] <= MOST_PIXELS:
-        raise InputError(f"{path}: {size[0]}x{size[1]} pixels; allowed: at most {MOST_PIXELS}")
+        raise InputError(f"{path}: {size[0]}x{size[1]} pixels; use at most {MOST_PIXELS}")
 
 
 def _webp_size(data: bytes) -> tuple[int, int]:

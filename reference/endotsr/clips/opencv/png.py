@@ -64,7 +64,7 @@ def opaque(pixels: Array, name: object) -> Array:
     """The three colour channels of a picture (H, W, 3) or (H, W, 4). Raises InputError if a pixel is transparent."""
     if pixels.shape[2] == 4 and pixels.dtype.kind == "u" and pixels[:, :, 3].min() < np.iinfo(pixels.dtype).max:
         raise InputError(
-            f"{name}: has transparent pixels, and what they hide is not shown; allowed: pictures without"
+            f"{name}: has transparent pixels, and what they hide is not shown; use pictures without"
             " transparency (a mask that is stored as transparency is stored as black and white)"
         )
     return pixels[:, :, :3]

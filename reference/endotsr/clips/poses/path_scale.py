@@ -50,7 +50,7 @@ class PathScale(NamedTuple):
         if self.told:
             return f"the path is scaled {base}"
         return (
-            f"the scale of the path cannot be told {base}; allowed: {LARGEST_SPREAD:.0%}, and"
+            f"the scale of the path cannot be told {base}; the limits are {LARGEST_SPREAD:.0%}, and"
             f" {LARGEST_INSIDE:.0%} for the points"
         )
 

@@ -96,7 +96,7 @@ def refuse_too_few(found: Structure) -> None:
             f" bridged at most; {remedy}"
         )
     if count - len(without) < REGISTERED * count:
-        raise InputError(f"{said}; allowed: at least {REGISTERED:.0%}; {remedy}")
+        raise InputError(f"{said}; use at least {REGISTERED:.0%}; {remedy}")
 
 
 def _write(views: Views, root: Path) -> None:

@@ -23,7 +23,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.names import counted
 
-ALLOWED = "allowed: frames A:B[:S] or N, seconds As:Bs, several with commas, such as 0:10,12,30s:45s"
+ALLOWED = "use frames A:B[:S] or N, seconds As:Bs, several with commas, such as 0:10,12,30s:45s"
 
 
 def chosen_frames(text: str, clip: Clip, option: str = "--frames") -> list[int]:
@@ -73,7 +73,7 @@ def _numbers(part: str, count: int) -> list[int]:
 def _seconds(part: str, clip: Clip) -> list[int]:
     """The frames of a time span such as `2.5s:8s`. The messages begin with the part, without the option."""
     if clip.times is None and not clip.rate:
-        raise InputError(f"{part!r}: the frame rate is unknown; allowed: {_stated_rate(clip)} with seconds")
+        raise InputError(f"{part!r}: the frame rate is unknown; use {_stated_rate(clip)} with seconds")
     words = part.split(":")
     try:
         bounds = [float(word.removesuffix("s")) if word.strip() else None for word in words]
@@ -82,7 +82,7 @@ def _seconds(part: str, clip: Clip) -> list[int]:
     if len(bounds) != 2 or any(word.strip() and not word.strip().endswith("s") for word in words):
         raise InputError(f"{part!r}: no span of seconds; {ALLOWED}")
     if any(bound is not None and bound < 0 for bound in bounds):
-        raise InputError(f"{part!r}: seconds count from the first frame; allowed: numbers from 0")
+        raise InputError(f"{part!r}: seconds count from the first frame; use numbers from 0")
     first, last = -np.inf if bounds[0] is None else bounds[0], np.inf if bounds[1] is None else bounds[1]
     times = clip.times_of(range(clip.count))
     elapsed: FloatArray = times - times[0]
@@ -105,9 +105,9 @@ def thinned(clip: Clip, frames: list[int], rate: float | None, notes: list[str])
     if rate is None:
         return frames
     if clip.rate is None:
-        raise InputError(f"{clip.where}: the frame rate is unknown; allowed: {_stated_rate(clip)} with --rate")
+        raise InputError(f"{clip.where}: the frame rate is unknown; use {_stated_rate(clip)} with --rate")
     if rate > clip.rate:
-        raise InputError(f"rate {rate:g}: the source has {clip.rate:g} frames per second; allowed: no more")
+        raise InputError(f"rate {rate:g}: the source has {clip.rate:g} frames per second; use no more")
     times = clip.times_of(frames)
     wanted = times[0] + np.arange(int((times[-1] - times[0]) * rate + 1e-6) + 1) / rate
     kept = np.unique(_nearest(times, wanted))
@@ -170,9 +170,7 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
         said = f"{what} of {size[0]}x{size[1]} pixels"
         if camera and size != (camera.width, camera.height):
             other = f"{camera.width}x{camera.height}"
-            raise InputError(
-                f"{clip.where}: frame {clip.names[i]}: {said}, the camera is of {other}; allowed: one size"
-            )
+            raise InputError(f"{clip.where}: frame {clip.names[i]}: {said}, the camera is of {other}; use one size")
         if part.shape[:2] != (height, width):
             raise InputError(f"{clip.where}: --crop {x} {y} {width} {height} leaves the {said}")
         return np.ascontiguousarray(part)
@@ -250,7 +248,7 @@ def masks_by_time(clip: Clip, late: int) -> Clip:
 def _refuse_long_lag(clip: Clip, late: int, option: str) -> None:
     if abs(late) >= clip.count:
         raise InputError(
-            f"{option} {late}: allowed: -{clip.count - 1} to {clip.count - 1} for {counted(clip.count, 'frame')}"
+            f"{option} {late}: use -{clip.count - 1} to {clip.count - 1} for {counted(clip.count, 'frame')}"
         )
 
 

@@ -43,7 +43,7 @@ def _tangential_warnings(distortion: FloatArray) -> list[str]:
         order = f"; {found[0]:g} {found[1]:g} {found[3]:g} {found[4]:g} {found[2]:g} if they are k1 k2 k3 p1 p2"
     return [
         f"warning: the distortion {said} has tangential coefficients of {np.abs(found[2:4]).max():g}, as no centred"
-        f" lens has; allowed: coefficients in the order k1 k2 p1 p2 [k3 [k4 k5 k6]]{order}"
+        f" lens has; use coefficients in the order k1 k2 p1 p2 [k3 [k4 k5 k6]]{order}"
     ]
 
 
@@ -56,5 +56,5 @@ def lens_warnings(matrix: FloatArray, distortion: FloatArray, width: int, height
     return [
         *found,
         f"warning: the distortion {said} turns back inside the picture: {folded:.1%} of it show parts of the source"
-        " twice; allowed: coefficients of this lens in the order k1 k2 p1 p2 [k3 [k4 k5 k6]]",
+        " twice; use coefficients of this lens in the order k1 k2 p1 p2 [k3 [k4 k5 k6]]",
     ]

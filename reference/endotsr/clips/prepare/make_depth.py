@@ -54,7 +54,7 @@ def stereo_frames(clip: Clip, settings: StereoSettings) -> Iterator[NDArray[np.f
     if clip.intrinsics is None or not clip.baseline:
         raise InputError(
             f"{clip.where}: the baseline is unknown: [camera] baseline is 0 in {FILE_NAME};"
-            " allowed: the distance between the two cameras in the unit of the file"
+            " use the distance between the two cameras in the unit of the file"
         )
     intrinsics, baseline = clip.intrinsics, clip.baseline
     disparity_range(settings, intrinsics, baseline)
@@ -62,7 +62,7 @@ def stereo_frames(clip: Clip, settings: StereoSettings) -> Iterator[NDArray[np.f
     depths: list[NDArray[np.float32]] = []
     for i, pair in enumerate(clip.pictures(list(range(clip.count)))):
         if pair.right is None:
-            raise InputError(f"{clip.where}: no right pictures (images_right/); allowed: a stereo sequence")
+            raise InputError(f"{clip.where}: no right pictures (images_right/); use a stereo sequence")
         found = stereo_depth(pair.left, pair.right, intrinsics, baseline, settings)
         if i == 0 and (found > 0).mean() < LITTLE:
             exchanged = stereo_depth(pair.right, pair.left, intrinsics, baseline, settings)
@@ -83,7 +83,7 @@ def _refuse_exchanged(coverage: float, exchanged: float, where: Path) -> None:
     if exchanged > max(LITTLE, EXCHANGED * coverage):
         raise InputError(
             f"{where}: {coverage:.1%} of the pixels of the first frame match the right picture, and {exchanged:.1%}"
-            " with left and right exchanged; allowed: left pictures in images/ and right ones in images_right/"
+            " with left and right exchanged; use left pictures in images/ and right ones in images_right/"
         )
 
 
@@ -169,7 +169,7 @@ def from_relative(
     clip = describe_prepared(folder)
     if clip.depth and not replace:
         raise InputError(
-            f"{folder}: has depth already; allowed: --replace, which fits scale and shift to it and fills the holes"
+            f"{folder}: has depth already; use --replace, which fits scale and shift to it and fills the holes"
         )
     files, note = every_frame(clip, stack_planes(source) or files_of(source, DEPTH_ENDINGS), pairing)
     made = relative_depth(clip, source, files, align, farthest, trusted)
@@ -190,7 +190,7 @@ def write_depth(
     clip, file = describe_prepared(folder), read_sequence_file(folder)
     names = clip.names
     if (file.depth or (folder / DEPTH).exists()) and not replace:
-        raise InputError(f"{folder}: has depth already; allowed: --replace")
+        raise InputError(f"{folder}: has depth already; use --replace")
     coverage, medians, step, clipped = [], [], 0.0, 0
 
     def record() -> None:

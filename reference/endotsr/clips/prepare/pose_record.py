@@ -39,7 +39,7 @@ def open_for_poses(folder: Path, replace: bool) -> tuple[SequenceFile, Clip]:
     width, height = file.camera.width, file.camera.height
     if width < LEAST_WIDTH or height < LEAST_HEIGHT:
         raise InputError(
-            f"{folder}: pictures of {width}x{height} pixels are too small to estimate poses from; allowed: at least"
+            f"{folder}: pictures of {width}x{height} pixels are too small to estimate poses from; use at least"
             f" {LEAST_WIDTH}x{LEAST_HEIGHT}, with a larger endotsr prepare --scale"
         )
     return file, clip

@@ -145,9 +145,9 @@ def _poses_and_masks(
             continue
         named = f"{len(frames)} of {len(chosen)} frames have no {what}: {shortened([str(i) for i in frames])}"
         if len(frames) == len(chosen):
-            raise InputError(f"{clip.where}: {named}; allowed: --frames some of which have one")
+            raise InputError(f"{clip.where}: {named}; use --frames some of which have one")
         if gaps == "refuse":
-            raise InputError(f"{clip.where}: {named}; allowed: --gaps drop (without these) or --gaps fill")
+            raise InputError(f"{clip.where}: {named}; use --gaps drop (without these) or --gaps fill")
         filling = "poses are interpolated" if what == "pose" else "the mask of the nearest frame is used"
         notes.append(f"{named}; {'left out' if gaps == 'drop' else filling}")
     if gaps != "refuse" and not any(lacking.values()):
@@ -267,7 +267,7 @@ def _depth(
         if found is not None and found.shape != size:
             raise InputError(
                 f"{clip.where}: frame {clip.names[i]}: depth of {found.shape[1]}x{found.shape[0]} pixels, the"
-                f" picture has {size[1]}x{size[0]}; allowed: one size (`endotsr depth --given` takes proportional ones)"
+                f" picture has {size[1]}x{size[0]}; use one size (`endotsr depth --given` takes proportional ones)"
             )
         return None if found is None else straight.depth(found)
     if clip.points is None or pose is None or points == "none":

@@ -146,7 +146,7 @@ def _aligned(clip: Clip, relative: Callable[[int], FloatArray], source: Path, al
         if line.scale <= 0:
             raise InputError(
                 f"{source}: frame {clip.names[i]}: the values decrease towards the camera, according to"
-                f" the depth of {clip.where.name}; allowed: a relative inverse depth, larger = nearer"
+                f" the depth of {clip.where.name}; use a relative inverse depth, larger = nearer"
             )
         found, z = line.depth(reference[i][0]), reference[i][1]
         apart.append(np.abs(found - z)[z > 0] / z[z > 0])
@@ -173,11 +173,11 @@ def _refuse_known_scale(clip: Clip) -> None:
     """Raises InputError if a stereo pair or moving poses fix the scale."""
     poses = [pose for pose in clip.poses or [] if pose is not None]
     if clip.right and clip.baseline:
-        raise InputError(f"{clip.where}: a stereo pair gives lengths; allowed: `endotsr depth {clip.where}` first")
+        raise InputError(f"{clip.where}: a stereo pair gives lengths; use `endotsr depth {clip.where}` first")
     if moves(poses):
         raise InputError(
             f"{clip.where}: the camera moves, and its poses fix the scale of the depth, which relative numbers do"
-            " not have; allowed: a clip with some depth, such as that of the points of a COLMAP model (`endotsr prepare"
+            " not have; use a clip with some depth, such as that of the points of a COLMAP model (`endotsr prepare"
             " MODEL --points sparse`) or of `endotsr poses --sfm`"
         )
 
@@ -194,7 +194,7 @@ def _assumed_line(
     samples = [values[np.isfinite(values)][::37] for values in map(relative, group)]
     low, high = np.percentile(np.concatenate(samples) if any(map(len, samples)) else [0.0], EXTREMES)
     if not high > low:
-        raise InputError(f"{source}: all values are {low:g}; allowed: a relative inverse depth")
+        raise InputError(f"{source}: all values are {low:g}; use a relative inverse depth")
     scale = (1 - 1 / farthest) / (high - low)
     return StraightLine(float(scale), float(1 - scale * high))
 
@@ -209,6 +209,6 @@ def _refuse_against_light(
         light.append(light_correlation(pair.left, lines[i].depth(relative(i)), tissue))
     if light_finding(light, str(source)):
         raise InputError(
-            f"{source}: the values are large where the pictures are dark, but near tissue is bright; allowed: a"
+            f"{source}: the values are large where the pictures are dark, but near tissue is bright; use a"
             " relative inverse depth, larger = nearer, or --trust-depth for a light source off the scope"
         )

@@ -32,7 +32,7 @@ from endotsr.errors import InputError
 NAMES = re.compile(r"dispar|(?<![a-z])disp(?![a-z])|inverse|inv_?depth|relative|midas|depth_?anything|(?<![a-z])dpt")
 LOOKED_AT = 8  # frames
 EXCHANGED = (
-    "neighbouring pixels differ far less with the two bytes of each number exchanged; allowed: the order of bytes of"
+    "neighbouring pixels differ far less with the two bytes of each number exchanged; use the order of bytes of"
     " the format, in PNG the high one first"
 )
 ROUGHER = 4.0  # times the mean difference of neighbours with exchanged bytes

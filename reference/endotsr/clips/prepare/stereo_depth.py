@@ -46,16 +46,14 @@ def disparity_range(settings: StereoSettings, intrinsics: Intrinsics, baseline: 
     Raises:  InputError for depths that are not ascending, or a range beyond `MOST` or the width of the pictures.
     """
     if not 0 < settings.nearest < settings.farthest < np.inf:
-        raise InputError(
-            f"nearest {settings.nearest:g}, farthest {settings.farthest:g}: allowed: two ascending numbers > 0"
-        )
+        raise InputError(f"nearest {settings.nearest:g}, farthest {settings.farthest:g}: use two ascending numbers > 0")
     lowest = int(np.floor(intrinsics.fx * baseline / settings.farthest))
     highest = int(np.ceil(intrinsics.fx * baseline / settings.nearest))
     count = -(-(highest - lowest + 1) // MULTIPLE) * MULTIPLE
     if count > min(MOST, intrinsics.width):
         raise InputError(
             f"depths from {settings.nearest:g} to {settings.farthest:g} at baseline {baseline:g} are disparities from"
-            f" {lowest} to {highest} px in pictures {intrinsics.width} px wide; allowed: a larger --nearest, or the"
+            f" {lowest} to {highest} px in pictures {intrinsics.width} px wide; use a larger --nearest, or the"
             " right baseline and unit"
         )
     return lowest, count

@@ -78,7 +78,7 @@ def straightener(clip: Clip, width: int, height: int, scale: float) -> Straighte
     Raises:  InputError without intrinsics, for a scale outside (0, 1], and for cameras that are not side by side.
     """
     if not 0 < scale <= 1:
-        raise InputError(f"scale {scale:g}: pictures can only be reduced; allowed: values in (0, 1]")
+        raise InputError(f"scale {scale:g}: pictures can only be reduced; use values in (0, 1]")
     new_size = round(width * scale), round(height * scale)
     if min(new_size) < 1:
         raise InputError(f"scale {scale:g} makes {new_size[0]}x{new_size[1]} pixels of {width}x{height}")
@@ -122,11 +122,10 @@ def _rectified(clip: Clip, new_size: tuple[int, int]) -> Straightener:
     across, down = abs(calibration.translation[0]), abs(calibration.translation[1])
     if down > SKEWED * across:
         raise InputError(
-            f"{clip.where}: the cameras are {across:g} apart horizontally and {down:g} vertically;"
-            " allowed: side by side"
+            f"{clip.where}: the cameras are {across:g} apart horizontally and {down:g} vertically; use side by side"
         )
     if clip.depth is not None:
-        raise InputError(f"{clip.where}: depth of pictures that are not rectified; allowed: without --depth")
+        raise InputError(f"{clip.where}: depth of pictures that are not rectified; prepare them without --depth")
     distortions = (
         np.array(calibration.left.distortion or (0.0,) * 4),
         np.array(calibration.right.distortion or (0.0,) * 4),

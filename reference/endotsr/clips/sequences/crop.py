@@ -42,7 +42,7 @@ def crop_within(window: tuple[int, ...], camera: Intrinsics | None, crop: Crop |
     Raises:  InputError for an empty window.
     """
     if len(window) != 4 or min(window[:2]) < 0 or min(window[2:]) < 1:
-        raise InputError(f"--crop {' '.join(map(str, window))}: allowed: X Y WIDTH HEIGHT in pixels, inside a picture")
+        raise InputError(f"--crop {' '.join(map(str, window))}: use X Y WIDTH HEIGHT in pixels, inside a picture")
     if camera is None:
         return None
     whole = crop or Crop(0, 0, camera.width, camera.height, camera.width, camera.height)
@@ -66,6 +66,6 @@ def stated_crop(crop: list[float], crop_of: list[float], where: object) -> Crop 
         if inside and min(crop[:2]) >= 0 and min(crop[2:]) > 0:
             return found
     raise InputError(
-        f"{where}: camera.crop = {crop} with camera.crop_of = {crop_of} is not allowed; allowed: x y width height of a"
+        f"{where}: camera.crop = {crop} with camera.crop_of = {crop_of} is not allowed; use x y width height of a"
         " window inside of a picture with this width and height, or neither key"
     )

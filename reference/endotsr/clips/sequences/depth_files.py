@@ -48,7 +48,7 @@ def read_plane(path: Path) -> NDArray:
     if (why := FILES.reason(FILES.refused, ending)) is not None:
         raise InputError(f"{path}: {why}")
     if ending not in DEPTH_ENDINGS:
-        raise InputError(f"{path}: no depth by its name; allowed: {', '.join(FILES.listed)}")
+        raise InputError(f"{path}: no depth by its name; use a name that ends in one of {', '.join(FILES.listed)}")
     points = read_points(path)
     if points is not None:
         return np.ascontiguousarray(points[:, :, 2])
@@ -59,7 +59,7 @@ def read_plane(path: Path) -> NDArray:
     if hole is not None:
         plane = np.where(plane == hole, 0, plane)
     if plane.ndim != 2:
-        raise InputError(f"{path}: array of shape {array.shape}; allowed: one plane (height, width)")
+        raise InputError(f"{path}: array of shape {array.shape}; use one plane (height, width)")
     return plane
 
 
@@ -70,14 +70,14 @@ def depth_plane(raw: NDArray, scale: float, where: object) -> NDArray[np.float32
              positive, or if a value exceeds the range of float32.
     """
     if raw.dtype.kind == "f" and raw.size and not np.isfinite(raw).any():
-        raise InputError(f"{where}: no value is finite; allowed: lengths, and 0 where there is no depth")
+        raise InputError(f"{where}: no value is finite; use lengths, and 0 where there is no depth")
     if raw.dtype.kind in "fi" and not (raw > 0).any() and np.unique(raw[raw < 0]).size > 1:
-        raise InputError(f"{where}: all values are negative; allowed: positive lengths, and 0 where there is no depth")
+        raise InputError(f"{where}: all values are negative; use positive lengths, and 0 where there is no depth")
     with np.errstate(over="ignore"):
         depth = raw.astype(np.float64) * scale
     depth[~np.isfinite(depth) | (depth <= 0)] = 0.0
     if depth.size and depth.max() > np.finfo(np.float32).max:
-        raise InputError(f"{where}: depth {depth.max():g} is too large; allowed: lengths below 3.4e38, and 0")
+        raise InputError(f"{where}: depth {depth.max():g} is too large; use lengths below 3.4e38, and 0")
     return depth.astype(np.float32)
 
 
@@ -109,7 +109,7 @@ def check_depth_scale(depth: NDArray[np.float32], files: list[Path], types: list
             other = next(j for j, kind in enumerate(types) if kind != types[i])
             raise InputError(
                 f"{files[i]}: {bits}-bit picture, its median depth is {ratio:.3g} times the usual one, while"
-                f" {files[other].name} has {8 * types[other].itemsize} bits; allowed: {unit} in every picture"
+                f" {files[other].name} has {8 * types[other].itemsize} bits; use {unit} in every picture"
             )
 
 

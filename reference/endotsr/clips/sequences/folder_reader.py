@@ -89,6 +89,6 @@ def of_size(pixels: NDArray, path: Path, size: tuple[int, int], said: str) -> ND
     """The pixels of a file. Raises InputError for another width and height than `size`, whose source is `said`."""
     if pixels.shape[1::-1] != size:
         raise InputError(
-            f"{path}: {pixels.shape[1]}x{pixels.shape[0]} pixels, {said} {size[0]}x{size[1]}; allowed: one size"
+            f"{path}: {pixels.shape[1]}x{pixels.shape[0]} pixels, {said} {size[0]}x{size[1]}; use one size"
         )
     return pixels

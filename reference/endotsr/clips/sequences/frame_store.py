@@ -39,7 +39,7 @@ class FrameStore:
         if self.in_file and self.needed > free:
             raise InputError(
                 f"{self._what}, more than half of the allowed memory, and {tempfile.gettempdir()} has"
-                f" {free / 1e9:.1f} GB; allowed: fewer --frames, smaller pictures (endotsr prepare --scale), or a"
+                f" {free / 1e9:.1f} GB; use fewer --frames, smaller pictures (endotsr prepare --scale), or a"
                 f" larger disk (TMPDIR){self._remedy}"
             )
 

@@ -73,12 +73,12 @@ def levels_of(values: Iterable[int], where: object, coded: bool = False) -> Mask
     white = 255 if largest <= 255 else 65535
     if largest < LEAST_WHITE:
         raise InputError(
-            f"{where}: numbers up to {largest} in all pictures: allowed: two values such as 0 and 255, {OBJECTS};"
+            f"{where}: numbers up to {largest} in all pictures: use two values such as 0 and 255, {OBJECTS};"
             " without --masks, if these are empty masks with the noise of a codec"
         )
     if largest < (white + 1) // 2 and len(found) > 1:
         raise InputError(
-            f"{where}: {len(found)} different values, the largest of all pictures is {largest}: allowed: 0 and {white},"
+            f"{where}: {len(found)} different values, the largest of all pictures is {largest}: use 0 and {white},"
             f" two values, {OBJECTS}"
         )
     near_white = any(white - white // 8 <= value < white for value in found)
@@ -125,7 +125,7 @@ def white_pixels(
     if plane.max() > levels.white or (levels.white > 255 and plane.dtype == np.uint8):
         raise InputError(
             f"{name}: {8 * plane.dtype.itemsize}-bit picture with numbers up to {plane.max()}, while white is"
-            f" {levels.white} in the others; allowed: one scale and one bit depth"
+            f" {levels.white} in the others; use one scale and one bit depth"
         )
     if exact == plane.size:
         return white, 0
@@ -134,7 +134,7 @@ def white_pixels(
         raise InputError(
             f"{name}: {between / plane.size:.1%} of the pixels are neither {levels.black} nor {levels.white}: this is"
             f" not a mask (another kind of picture in the mask folder, or masks written with different scales?);"
-            f" allowed: the values {levels.named}, {OBJECTS}"
+            f" use the values {levels.named}, {OBJECTS}"
         )
     if not levels.graded:
         _refuse_areas(plane, levels, name)
@@ -148,7 +148,7 @@ def refuse_parts(plane: NDArray, name: object) -> None:
     wrong = ~(plane == np.round(plane))  # NaN is not whole either
     if wrong.any():
         raise InputError(
-            f"{name}: holds {plane[wrong][0]:g}; allowed: whole numbers; a threshold, such as > 0.5, makes a mask of"
+            f"{name}: holds {plane[wrong][0]:g}; use whole numbers; a threshold, such as > 0.5, makes a mask of"
             " probabilities"
         )
 
@@ -161,7 +161,7 @@ def refuse_coded_objects(read: Callable[[int], NDArray], count: int, where: obje
     if len(values) > MOST_NUMBERS:
         raise InputError(
             f"{where}: {len(values)} different numbers, as a JPEG, a video or smooth edges have them; with"
-            f" --excluded-value nonzero all but 0 would be excluded; allowed: at most {MOST_NUMBERS} numbers of objects"
+            f" --excluded-value nonzero all but 0 would be excluded; use at most {MOST_NUMBERS} numbers of objects"
         )
 
 
@@ -176,5 +176,5 @@ def _refuse_areas(plane: NDArray, levels: MaskLevels, name: object) -> None:
         number = int(plane[1:-1, 1:-1][same][0])
         raise InputError(
             f"{name}: areas of the number {number}, which is neither {levels.black} nor {levels.white}: an object, or a"
-            f" mask on another scale? allowed: {levels.named}, {OBJECTS}"
+            f" mask on another scale? use {levels.named}, {OBJECTS}"
         )

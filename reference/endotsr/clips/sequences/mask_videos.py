@@ -31,7 +31,7 @@ def mask_files(path: Path) -> list[Path] | None:
     facts = video_facts(path)
     if facts.count * facts.width * facts.height > MOST_BYTES:
         raise InputError(
-            f"{path}: {counted(facts.count, 'mask')} of {facts.width}x{facts.height} pixels; allowed: a video of at"
+            f"{path}: {counted(facts.count, 'mask')} of {facts.width}x{facts.height} pixels; use a video of at"
             f" most {MOST_BYTES} pixels, or a folder of pictures"
             f" (`ffmpeg -i {path.name} -start_number 0 masks/%06d.png`)"
         )
@@ -70,6 +70,6 @@ def _planes(path: Path, changed: int, size: int) -> NDArray[np.uint8]:
     for k, picture in enumerate(video_pictures(path, list(range(count)))):
         spread = picture.max(axis=2).astype(np.int16) - picture.min(axis=2)
         if spread.max() >= LEAST_WHITE:
-            raise InputError(f"{path}: picture {k} is coloured; allowed: masks in black and white")
+            raise InputError(f"{path}: picture {k} is coloured; use masks in black and white")
         planes.append(np.ascontiguousarray(picture[:, :, 1]))
     return np.stack(planes)

@@ -88,5 +88,5 @@ def _check_one_bit_depth(names: list[str], types: list[np.dtype]) -> None:
     if odd is not None:
         raise InputError(
             f"{names[odd]}: {8 * types[odd].itemsize}-bit picture; {frequency} of the {len(types)} masks have"
-            f" {8 * usual.itemsize} bits, {Path(names[types.index(usual)]).name} for one; allowed: one bit depth"
+            f" {8 * usual.itemsize} bits, {Path(names[types.index(usual)]).name} for one; use one bit depth"
         )

@@ -53,7 +53,7 @@ def paired(
     elif pairing == "source":
         where = files[0].parent
         raise InputError(
-            f"{where}: --pairing source, but the frames are not those of a prepared clip; allowed: number or order"
+            f"{where}: --pairing source, but the frames are not those of a prepared clip; use number or order"
         )
     way = _chosen(found, frames, files) if pairing == "auto" else pairing
     chosen = found[way]
@@ -80,7 +80,7 @@ def every_frame(clip: Clip, files: list[Path], pairing: Pairing = "auto") -> tup
     if lacking := [name for name, file in zip(clip.names, found.files) if file is None]:
         raise InputError(
             f"{files[0].parent}: has no file for frame {shortened(lacking)}; {counted(len(files), 'file')} for"
-            f" {counted(clip.count, 'frame')}; allowed: one file per frame"
+            f" {counted(clip.count, 'frame')}; use one file per frame"
         )
     return [file for file in found.files if file is not None], found.note
 
@@ -103,8 +103,7 @@ def _in_order(frames: list[Path] | int, files: list[Path]) -> Paired:
     where, count = files[0].parent, frames if isinstance(frames, int) else len(frames)
     if len(files) != count:
         raise InputError(
-            f"{where}: --pairing order: {counted(len(files), 'file')} for {counted(count, 'frame')}; allowed: one"
-            " per frame"
+            f"{where}: --pairing order: {counted(len(files), 'file')} for {counted(count, 'frame')}; use one per frame"
         )
     note = f"{where.name}: --pairing order pairs {files[0].name} with the first frame"
     return Paired(list(files), note + ("" if isinstance(frames, int) else _as_text(frames)))
@@ -151,7 +150,7 @@ def _chosen(
     for meaning, fitting in fits.items():
         if len(fitting) == 2 and possible["number"] != possible["source"]:
             said = " or ".join(f"--pairing {way} ({WAYS[way]})" for way in fitting)
-            raise InputError(f"{files[0].parent}: {meaning} in two ways that differ; allowed: {said}")
+            raise InputError(f"{files[0].parent}: {meaning} in two ways that differ; use {said}")
         if fitting:
             return "number" if "number" in fitting else "source"
     lines = [
@@ -161,14 +160,14 @@ def _chosen(
     ]
     others = [*possible, *(["order"] if len(files) == count else [])]
     raise InputError(
-        f"{files[0].parent}: {'; '.join(lines)} ({files[0].name} to {files[-1].name}); allowed: "
+        f"{files[0].parent}: {'; '.join(lines)} ({files[0].name} to {files[-1].name}); use "
         + " or ".join(f"--pairing {way}" + (f" ({WAYS[way]})" if way == "order" else "") for way in others)
     )
 
 
 def _order_hint(count: int, files: list[Path]) -> str:
     """The end of a refusal where the files could be paired in order."""
-    return f"; allowed: --pairing order ({WAYS['order']})" if len(files) == count else ""
+    return f"; use --pairing order ({WAYS['order']})" if len(files) == count else ""
 
 
 def _refuse_names(frames: list[Path] | int, files: list[Path], hint: str = "") -> NoReturn:

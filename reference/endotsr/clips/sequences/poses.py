@@ -21,7 +21,7 @@ from endotsr.untrusted.names import counted
 
 POSE_FILES = ("poses_bounds.npy", "pose_bounds.npy")
 LARGEST_POSES = 1 << 26  # bytes: half a million frames
-ALLOWED_POSES = "allowed: an .npy file of numbers, (frames, 17)"
+ALLOWED_POSES = "use an .npy file of numbers, (frames, 17)"
 FLIP = np.diag(AXES["opengl"])
 SAME_FOCAL = 1e-6  # relative difference of two equal focal lengths
 
@@ -43,16 +43,13 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
     if rows.ndim != 2 or rows.shape[1] != 17:
         raise InputError(f"{path}: shape {rows.shape}, expected (frames, 17)")
     if len(rows) != count:
-        raise InputError(
-            f"{path}: {counted(len(rows), 'pose')} for {counted(count, 'image')}; allowed: one row per image"
-        )
+        raise InputError(f"{path}: {counted(len(rows), 'pose')} for {counted(count, 'image')}; use one row per image")
     rows = rows.astype(np.float64)
     broken = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if broken.size:
         column = int(np.flatnonzero(~np.isfinite(rows[broken[0]]))[0])
         raise InputError(
-            f"{path}: frame {broken[0]}: value {column} of the row is {rows[broken[0], column]};"
-            " allowed: finite numbers"
+            f"{path}: frame {broken[0]}: value {column} of the row is {rows[broken[0], column]}; use finite numbers"
         )
     return rows
 

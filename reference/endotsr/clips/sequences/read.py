@@ -121,7 +121,7 @@ def check_percentiles(config: SequenceConfig) -> None:
     """Raises InputError unless the depth percentiles are in [0, 100], one below and one above the median."""
     low, high = config.depth_percentiles
     if not enclose_median(low, high):
-        raise InputError(f"depth_percentiles: ({low:g}, {high:g}): allowed: {PERCENTILES}")
+        raise InputError(f"depth_percentiles: ({low:g}, {high:g}): use {PERCENTILES}")
 
 
 def _depth_percentiles(clip: Clip, config: SequenceConfig) -> tuple[SequenceConfig, list[str]]:

@@ -129,15 +129,13 @@ def checked_record(data: Any, where: str, prefix: str = "") -> SequenceRecord:
     """
     for field in msgspec.structs.fields(SequenceRecord):
         if field.required and (not isinstance(data, dict) or field.name not in data):
-            raise InputError(f"{where}: {prefix}{field.name} is missing; allowed: the record as a run wrote it")
+            raise InputError(f"{where}: {prefix}{field.name} is missing; use the record as a run wrote it")
     found = typed(data, SequenceRecord, where)
     names = [file_name(name, f"{where}: names") for name in found.names]
     if len(set(names)) < len(names):
-        raise InputError(f"{where}: names: two frames have one name; allowed: a name for each frame")
+        raise InputError(f"{where}: names: two frames have one name; use a name for each frame")
     if len(found.times) != len(names):
-        raise InputError(
-            f"{where}: times: {len(found.times)} for {counted(len(names), 'frame')}; allowed: one per frame"
-        )
+        raise InputError(f"{where}: times: {len(found.times)} for {counted(len(names), 'frame')}; use one per frame")
     _check_split(found, where)
     _check_cameras(found, where)
     return found
@@ -146,31 +144,31 @@ def checked_record(data: Any, where: str, prefix: str = "") -> SequenceRecord:
 def _check_split(found: SequenceRecord, where: str) -> None:
     for key, index in (("train_index", found.train_index), ("test_index", found.test_index)):
         if index and (max(index) >= found.count or len(set(index)) < len(index)):
-            raise InputError(f"{where}: {key}: allowed: frames from 0 to {found.count - 1}, each once")
+            raise InputError(f"{where}: {key}: use frames from 0 to {found.count - 1}, each once")
     if not found.train_index:
-        raise InputError(f"{where}: train_index: holds no frame; allowed: at least one")
+        raise InputError(f"{where}: train_index: holds no frame; use at least one")
     if both := set(found.train_index) & set(found.test_index):
         raise InputError(
-            f"{where}: test_index: frame {min(both)} is a training frame as well; allowed: a frame in one of both lists"
+            f"{where}: test_index: frame {min(both)} is a training frame as well; use a frame in one of both lists"
         )
 
 
 def _check_cameras(found: SequenceRecord, where: str) -> None:
     expected = 1 if found.static_camera else found.count
     if len(found.cameras) != expected:
-        raise InputError(f"{where}: cameras: {len(found.cameras)} of them; allowed: {expected}")
+        raise InputError(f"{where}: cameras: {len(found.cameras)} of them; use {expected}")
     for k, camera in enumerate(found.cameras):
         if camera.width * camera.height > MOST_PIXELS:
-            raise InputError(f"{where}: cameras: {k}: {camera.width}x{camera.height} pixels; allowed: {MOST_PIXELS}")
+            raise InputError(f"{where}: cameras: {k}: {camera.width}x{camera.height} pixels; use at most {MOST_PIXELS}")
         for i, row in enumerate(camera.rotation):
             for j, other in enumerate(camera.rotation):
                 if abs(sum(a * b for a, b in zip(row, other)) - (i == j)) > ROTATION_TOLERANCE:
                     raise InputError(
                         f"{where}: cameras: {k}: rotation: its rows are not perpendicular unit vectors;"
-                        " allowed: those of a rotation matrix"
+                        " use those of a rotation matrix"
                     )
         (a, b, c), (d, e, f), (g, h, i) = camera.rotation
         if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0:
             raise InputError(
-                f"{where}: cameras: {k}: rotation: its rows are a mirror image; allowed: those of a rotation matrix"
+                f"{where}: cameras: {k}: rotation: its rows are a mirror image; use those of a rotation matrix"
             )

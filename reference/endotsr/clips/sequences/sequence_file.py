@@ -159,7 +159,7 @@ def read_sequence_file(folder: Path) -> SequenceFile:
         raise InputError(f"{folder}: has no {FILE_NAME}; use a folder that `endotsr prepare SOURCE --out FOLDER` wrote")
     data = read_toml(path)
     if data.get("format") != FORMAT:
-        raise InputError(f"{path}: format = {data.get('format')!r} is not allowed; allowed: {FORMAT!r}")
+        raise InputError(f"{path}: format = {data.get('format')!r} is not allowed; use {FORMAT!r}")
     for key, needed in (("frames", data), ("camera", data)):
         if key not in needed:
             raise InputError(f"{path}: {key} is missing")
@@ -170,16 +170,14 @@ def read_sequence_file(folder: Path) -> SequenceFile:
     found = checked(data, SequenceFile, str(path))
     if found.depth and (found.depth.unit == ARBITRARY) != found.arbitrary:
         raise InputError(
-            f"{path}: depth.unit = {found.depth.unit!r} with unit = {found.unit!r} is not allowed; allowed: both"
+            f"{path}: depth.unit = {found.depth.unit!r} with unit = {found.unit!r} is not allowed; use both"
             " arbitrary (then of one scale), or neither"
         )
     if found.depth and found.depth.assumed and not found.arbitrary:
-        raise InputError(f"{path}: depth.assumed with unit = {found.unit!r} is not allowed; allowed: 'arbitrary'")
+        raise InputError(f"{path}: depth.assumed with unit = {found.unit!r} is not allowed; use 'arbitrary'")
     for key, entry in (("masks", found.masks), ("depth", found.depth)):
         if entry and not _plain_name(entry.folder):
-            raise InputError(
-                f"{path}: {key}.folder = {entry.folder!r} is not allowed; allowed: a folder next to the file"
-            )
+            raise InputError(f"{path}: {key}.folder = {entry.folder!r} is not allowed; use a folder next to the file")
     found.camera.intrinsics(path)
     stated_crop(found.camera.crop, found.camera.crop_of, path)
     _check_times(found, path)
@@ -193,12 +191,12 @@ def _check_times(found: SequenceFile, path: Path) -> None:
         return
     if len(found.times) != found.frames:
         raise InputError(
-            f"{path}: times: {len(found.times)} numbers for {counted(found.frames, 'frame')}; allowed: one per frame"
+            f"{path}: times: {len(found.times)} numbers for {counted(found.frames, 'frame')}; use one per frame"
         )
     steps = np.diff(found.times)
     if not np.isfinite(found.times).all() or (steps <= 0).any():
         wrong = int(np.flatnonzero(~(steps > 0))[0]) + 1 if steps.size and not (steps > 0).all() else 0
-        raise InputError(f"{path}: times: frame {wrong}: {found.times[wrong]:g}; allowed: finite, ascending seconds")
+        raise InputError(f"{path}: times: frame {wrong}: {found.times[wrong]:g}; use finite, ascending seconds")
 
 
 def _check_source_names(found: SequenceFile, path: Path) -> None:
@@ -209,12 +207,12 @@ def _check_source_names(found: SequenceFile, path: Path) -> None:
     if len(names) != found.frames:
         raise InputError(
             f"{path}: source_names: {counted(len(names), 'name')} for {counted(found.frames, 'frame')};"
-            " allowed: one per frame"
+            " use one per frame"
         )
     for name in names:
         file_name(name, f"{path}: source_names")
     if len(set(names)) < len(names):
-        raise InputError(f"{path}: source_names: two frames have one name; allowed: each name once")
+        raise InputError(f"{path}: source_names: two frames have one name; use each name once")
 
 
 def _check_section(data: dict, kind: type[Section], path: Path, key: str) -> None:
@@ -246,7 +244,7 @@ def read_poses(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None]
     rows = found.poses.matrices
     if len(rows) != found.frames:
         raise InputError(
-            f"{path}: poses.matrices: {len(rows)} rows for {counted(found.frames, 'frame')}; allowed: one row per frame"
+            f"{path}: poses.matrices: {len(rows)} rows for {counted(found.frames, 'frame')}; use one row per frame"
         )
     poses: list[CameraPose | None] = []
     faults = {}
@@ -261,7 +259,7 @@ def read_poses(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None]
 
 def _pose(row: list[float], entry: PoseEntry, scale: float, where: str) -> CameraPose:
     if len(row) != 12:
-        raise InputError(f"{where}: {len(row)} numbers; allowed: 12, the rows of a 3x4 matrix")
+        raise InputError(f"{where}: {len(row)} numbers; use 12, the rows of a 3x4 matrix")
     matrix = np.array(row, np.float64).reshape(3, 4)
     return pose_of(matrix[:, :3], matrix[:, 3] * scale, entry.direction, entry.axes, where)
 

@@ -22,13 +22,13 @@ def too_small(width: int, height: int, made: str = "") -> str:
     """Why a training needs larger pictures; "" if these are large enough. `made`: how they came to this size."""
     if min(width, height) >= LEAST_SIDE:
         return ""
-    return f"{made or f'images of {width}x{height} pixels'}; allowed: at least {LEAST_SIDE} on each side"
+    return f"{made or f'images of {width}x{height} pixels'}; use at least {LEAST_SIDE} on each side"
 
 
 def trained_size(width: int, height: int, scale: float, where: object) -> tuple[int, int]:
     """Width and height at `sequence.scale`. Raises InputError for a scale outside (0, 1], and for small pictures."""
     if scale > 1:
-        raise InputError(f"{where}: scale {scale:g}: images can only be reduced; allowed: values in (0, 1]")
+        raise InputError(f"{where}: scale {scale:g}: images can only be reduced; use values in (0, 1]")
     small = round(width * scale), round(height * scale)
     made = "" if scale == 1 else f"scale {scale:g} makes {small[0]}x{small[1]} pixels of {width}x{height}"
     if found := too_small(*small, made):

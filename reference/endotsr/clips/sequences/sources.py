@@ -40,7 +40,7 @@ def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
     """The file itself, or the files of a folder in time order. Raises InputError."""
     if path.is_file():
         if path.suffix.lower() not in endings:
-            raise InputError(f"{path}: allowed: a file that ends in {', '.join(endings)}, or a folder of such files")
+            raise InputError(f"{path}: use a file that ends in {', '.join(endings)}, or a folder of such files")
         return [path]
     return list_pictures(path, endings)
 
@@ -207,5 +207,5 @@ def unit_of(options: SourceOptions) -> str:
     if options.depth is not None:
         stated.append(options.depth_unit)
     if len({unit == ARBITRARY for unit in stated}) > 1:
-        raise InputError("one of --trajectory-unit and --depth-unit is arbitrary: allowed: both or neither")
+        raise InputError("one of --trajectory-unit and --depth-unit is arbitrary: use both or neither")
     return ARBITRARY if ARBITRARY in stated else "mm"

@@ -125,7 +125,7 @@ def parse_frame_range(text: str, count: int, least: int = LEAST_FRAMES) -> range
         if bound is not None and not -count <= bound <= count:
             raise InputError(
                 f"frames {text!r}: {bound} is outside the {counted(count, 'frame')} of the sequence;"
-                f" allowed: {-count} to {count}"
+                f" use {-count} to {count}"
             )
     chosen = range(count)[slice(start, stop, step)]
     if len(chosen) < least:

@@ -71,7 +71,7 @@ def _require(needed: Requirement, settings: SimulatorSettings) -> None:
             raise _refusal(settings, section, key, _all_fit if _all_fit(without) else needed.fits)
     tried = dict.fromkeys(f"{section}.{key}" for section, key in needed.sizes if getattr(settings, section).on)
     smaller = f", or smaller {', '.join(tried)}" if tried else ""
-    raise InputError(f"simulator: the scene leaves the field of view; allowed: {needed.remedy}{smaller}")
+    raise InputError(f"simulator: the scene leaves the field of view; use {needed.remedy}{smaller}")
 
 
 def _slit_ends(settings: SimulatorSettings) -> FloatArray:
@@ -141,4 +141,4 @@ def _refusal(settings: SimulatorSettings, section: str, key: str, fits: Fits) ->
         low, high = (middle, high) if fits(_changed(settings, section, key, middle)) else (low, middle)
     largest = np.floor(low * 100) / 100
     found = f"simulator: {section}.{key} = {value:g} leaves the field of view, or folds the tissue"
-    return InputError(f"{found}; allowed: at most {largest:g}")
+    return InputError(f"{found}; use at most {largest:g}")

@@ -41,12 +41,10 @@ def check_scene(settings: SimulatorSettings) -> None:
     part = settings.depth_rounding
     if not part.on or part.step != round(part.step):
         found = f"depth_rounding.step = {part.step:g}" if part.on else "depth_rounding.on = False"
-        raise InputError(
-            f"simulator: {found} does not fit a folder, which holds whole millimetres; allowed: 1, 2, 3 .."
-        )
+        raise InputError(f"simulator: {found} does not fit a folder, which holds whole millimetres; use 1, 2, 3 ..")
     if not (settings.stereo.on or settings.instrument.on or settings.more_instruments.on):
         raise InputError(
-            "simulator: a sequence without an excluded pixel is not read without a flag; allowed: stereo, instrument or"
+            "simulator: a sequence without an excluded pixel is not read without a flag; use stereo, instrument or"
             " more_instruments on"
         )
     check_split(settings)
@@ -57,7 +55,7 @@ def check_split(settings: SimulatorSettings) -> None:
     """Raises InputError for too few frames, or for a split of its own: files hold none, a training chooses it."""
     if settings.block_length:
         raise InputError(
-            f"simulator: block_length = {settings.block_length} does not fit files, which hold no split; allowed: 0,"
+            f"simulator: block_length = {settings.block_length} does not fit files, which hold no split; use 0,"
             f" and endotsr train --sequence.split blocks --sequence.block-length {settings.block_length}"
         )
     split_frames(settings.frames, "every_eighth", 0)
@@ -145,7 +143,7 @@ def _whole_millimetres(prior: NDArray[np.float32], name: str) -> NDArray[np.uint
     """Levels of a picture of depth. Raises InputError for a depth beyond the largest level."""
     if prior.max() > DEEPEST:
         raise InputError(
-            f"simulator: depth/{name}: the prior depth reaches {prior.max():.0f} mm; allowed: at most {DEEPEST}, with a"
+            f"simulator: depth/{name}: the prior depth reaches {prior.max():.0f} mm; use at most {DEEPEST}, with a"
             " smaller distance, relief, depth_errors.sigma or depth_rounding.step"
         )
     return prior.astype(np.uint16)

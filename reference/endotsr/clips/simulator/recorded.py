@@ -32,9 +32,7 @@ def check_truth(folder: Path) -> tuple[SceneTruth, Surface]:
         expected = surface_point(surface, truth.tracks.material, float(t))
         if not np.allclose(position, expected, rtol=0, atol=TOLERANCE):
             path = truth.folder / "tracks.npz"
-            raise InputError(
-                f"{path}: position at time {t:g} is not that of the settings; allowed: those of truth.json"
-            )
+            raise InputError(f"{path}: position at time {t:g} is not that of the settings; use those of truth.json")
     return truth, surface
 
 
@@ -54,7 +52,7 @@ def recorded_positions(folder: Path, sequence: Sequence) -> Callable[[int, int],
     unknown = [name for name in sequence.names if name not in numbers]
     if unknown:
         found = f"{truth.folder}: frame {unknown[0]!r} of the sequence is not in the scene"
-        raise InputError(f"{found}; allowed: 000000 to {settings.frames - 1:06d}")
+        raise InputError(f"{found}; use 000000 to {settings.frames - 1:06d}")
     if (settings.width, settings.height) != (sequence.width, sequence.height):
         return None
 

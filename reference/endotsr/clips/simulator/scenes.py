@@ -28,7 +28,7 @@ SCENES: dict[str, tuple[str, ...]] = {
 def named_scene(name: str) -> SimulatorSettings:
     """The settings of a scene. Raises InputError for a name that is not in SCENES."""
     if name not in SCENES:
-        raise InputError(f"scene {name!r} is not allowed; allowed: {', '.join(SCENES)}")
+        raise InputError(f"scene {name!r} is not allowed; use one of {', '.join(SCENES)}")
     return with_effects(SIZE, *SCENES[name], *IN_FILES)
 
 

@@ -63,12 +63,12 @@ class SimulatorSettings(Section, frozen=True, kw_only=True):
         """Raise InputError for pictures that no reader takes, or an effect that ends before it begins."""
         if self.width * self.height > MOST_PIXELS:
             raise InputError(
-                f"{where}: {self.width}x{self.height} pixels are not allowed; allowed: at most {MOST_PIXELS} in all"
+                f"{where}: {self.width}x{self.height} pixels are not allowed; use at most {MOST_PIXELS} in all"
             )
         for name, part in (("pull", self.pull), ("smoke", self.smoke)):
             if part.on and part.stop <= part.start:
                 raise InputError(
-                    f"{where}: {name}.stop = {part.stop:g} is not allowed; allowed: a number above {name}.start ="
+                    f"{where}: {name}.stop = {part.stop:g} is not allowed; use a number above {name}.start ="
                     f" {part.start:g}"
                 )
 
@@ -85,6 +85,6 @@ def with_effects(settings: SimulatorSettings, *names: str) -> SimulatorSettings:
     """
     unknown = set(names) - set(EFFECTS)
     if unknown:
-        raise InputError(f"effects: unknown: {', '.join(sorted(unknown))}; allowed: {', '.join(EFFECTS)}")
+        raise InputError(f"effects: unknown: {', '.join(sorted(unknown))}; use one of {', '.join(EFFECTS)}")
     switched = {name: msgspec.structs.replace(getattr(settings, name), on=name in names) for name in EFFECTS}
     return msgspec.structs.replace(settings, **switched)

@@ -44,11 +44,11 @@ def make_slit(settings: SimulatorSettings) -> Slit:
     widest = 2 * LARGEST_STRETCH * part.reach / STEEPEST
     if part.opening > widest:
         raise InputError(
-            f"simulator: cutting.opening = {part.opening:g} folds the tissue next to the slit; allowed: at most"
+            f"simulator: cutting.opening = {part.opening:g} folds the tissue next to the slit; use at most"
             f" {widest:.3g} with cutting.reach = {part.reach:g}"
         )
     if part.start >= part.stop:
-        raise InputError(f"simulator: cutting.stop = {part.stop:g}: allowed: above cutting.start = {part.start:g}")
+        raise InputError(f"simulator: cutting.stop = {part.stop:g}: use a number above cutting.start = {part.start:g}")
     centre = np.array(CENTRE) * settings.distance
     along = np.array([np.cos(ANGLE), np.sin(ANGLE)])
     across = np.array([-along[1], along[0]])

@@ -32,9 +32,9 @@ METRE = 1000.0  # millimetres
 def check_recording(settings: SimulatorSettings) -> None:
     """Raises InputError for settings that cannot become such a recording. Nothing is rendered."""
     if not settings.stereo.on:
-        raise InputError("simulator: stereo.on = False does not fit the layout stereomis; allowed: True")
+        raise InputError("simulator: stereo.on = False does not fit the layout stereomis; use True")
     if settings.width % 2:
-        raise InputError(f"simulator: width = {settings.width} does not fit a video; allowed: even numbers")
+        raise InputError(f"simulator: width = {settings.width} does not fit a video; use even numbers")
     check_split(settings)
     check_field_of_view(settings)
 

@@ -75,7 +75,7 @@ class SceneTruth:
         picture = self.folder / "instrument" / f"{i:06d}.png"
         pixels = read_png(picture)
         if pixels.shape != size or not np.isin(pixels, (0, 255)).all():
-            raise InputError(f"{picture}: allowed: a picture of {size[1]}x{size[0]} pixels with the values 0 and 255")
+            raise InputError(f"{picture}: use a picture of {size[1]}x{size[0]} pixels with the values 0 and 255")
         return FrameTruth(found["depth"], found["material"], found["highlight"], pixels == 255)
 
 
@@ -141,13 +141,13 @@ def read_truth(sequence: Path) -> SceneTruth:
 def _record(path: Path) -> tuple[str, SimulatorSettings]:
     """Name and settings of truth.json."""
     if not path.is_file():
-        raise InputError(f"{path}: file not found; allowed: a sequence folder that `endotsr simulate` wrote")
+        raise InputError(f"{path}: file not found; use a sequence folder that `endotsr simulate` wrote")
     data = read_json(path)
     if data.get("format") != FORMAT:
-        raise InputError(f"{path}: format = {shown(data.get('format'))} is not allowed; allowed: {FORMAT}")
+        raise InputError(f"{path}: format = {shown(data.get('format'))} is not allowed; use {FORMAT}")
     settings = data.get("settings")
     if not isinstance(settings, dict):
-        raise InputError(f"{path}: settings is missing; allowed: the settings that `endotsr simulate` wrote")
+        raise InputError(f"{path}: settings is missing; use the settings that `endotsr simulate` wrote")
     return str(data.get("scene", "")), checked(settings, SimulatorSettings, str(path), "settings.")
 
 
@@ -157,7 +157,7 @@ def _arrays(path: Path, shapes: dict[str, tuple[Any, ...]]) -> dict[str, Any]:
     free: int | None = None
     for name, expected in shapes.items():
         if name not in found:
-            raise InputError(f"{path}: {name} is missing; allowed: {', '.join(shapes)}")
+            raise InputError(f"{path}: {name} is missing; the file needs {', '.join(shapes)}")
         array = found[name]
         if free is None and "P" in expected and array.ndim == len(expected):
             free = array.shape[expected.index("P")]
@@ -165,7 +165,7 @@ def _arrays(path: Path, shapes: dict[str, tuple[Any, ...]]) -> dict[str, Any]:
         kind = "b" if name == "visible" else "f"
         if array.shape != shape or array.dtype.kind != kind:
             wanted = "true or false" if kind == "b" else "real numbers"
-            raise InputError(f"{path}: {name} is {array.dtype} of shape {array.shape}; allowed: {wanted}, {shape}")
+            raise InputError(f"{path}: {name} is {array.dtype} of shape {array.shape}; use {wanted}, {shape}")
         if kind == "f" and (np.isinf(array).any() or (name not in MAY_BE_NAN and np.isnan(array).any())):
-            raise InputError(f"{path}: {name} holds a number that is not finite; allowed: finite numbers")
+            raise InputError(f"{path}: {name} holds a number that is not finite; use finite numbers")
     return found

@@ -15,7 +15,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import Camera
 
-TOO_STRONG = "motion or relief is too strong; allowed: smaller ones"
+TOO_STRONG = "motion or relief is too strong; use smaller ones"
 Formula = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 # (p, q) -> position, its derivatives with respect to p and q, each (3, ...)
 

@@ -106,7 +106,7 @@ def appearance_forward(
     Oracle:  `endotsr.definition.appearance`
     """
     if not (math.isfinite(beta) and beta > 0):
-        raise ValueError(f"beta {beta}; allowed: finite, > 0")
+        raise ValueError(f"beta {beta}; use a finite number > 0")
     argument = combine(appearance_coefficients, phi_bar)
     residual, slope = np.empty_like(argument), np.empty_like(argument)
     x, value, derivative = argument.reshape(-1), residual.reshape(-1), slope.reshape(-1)

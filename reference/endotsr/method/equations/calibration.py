@@ -77,7 +77,7 @@ def calibrate(views: Iterable[ViewRms | tuple[str, float, float]], gradient_rati
     Oracle:         `endotsr.definition.calibration`
     """
     if not (math.isfinite(gradient_ratio) and gradient_ratio > 0):
-        raise ValueError(f"gradient ratio {gradient_ratio}; allowed: finite, > 0")
+        raise ValueError(f"gradient ratio {gradient_ratio}; use a finite number > 0")
     ratios = []
     lines = [f"{'view':<24} {'g_rgb':>12} {'g_lap':>12}  g_lap/g_rgb"]
     for view in (ViewRms(*v) for v in views):

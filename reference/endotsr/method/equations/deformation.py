@@ -103,7 +103,7 @@ def deformation_reverse(d_offsets: FloatArray, saved: DeformationSaved) -> Defor
 
 def _check(weight: FloatArray, centre: FloatArray, width: FloatArray, basis: str) -> None:
     if basis not in BASES:
-        raise ValueError(f"basis: {basis!r} is unknown; allowed: {', '.join(BASES)}")
+        raise ValueError(f"basis: {basis!r} is unknown; use one of {', '.join(BASES)}")
     if weight.ndim != 3 or weight.shape[0] != CHANNELS:
         raise ValueError(f"fdm_weight: expected (10, B, N), got {weight.shape}")
     for name, array in (("fdm_centre", centre), ("fdm_width", width)):

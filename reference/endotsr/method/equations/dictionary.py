@@ -77,9 +77,9 @@ def frequencies(count: int, low: float, high: float, dtype: DTypeLike = np.float
     Oracle:  the powers 16^(k/7) in extended precision.
     """
     if count < 1:
-        raise ValueError(f"count of frequencies: {count}; allowed: >= 1")
+        raise ValueError(f"count of frequencies: {count}; use an integer >= 1")
     if not (math.isfinite(high) and 0 < low <= high):
-        raise ValueError(f"frequencies from {low} to {high}; allowed: 0 < low <= high, finite")
+        raise ValueError(f"frequencies from {low} to {high}; use finite numbers with 0 < low <= high")
     omega = np.geomspace(low, high, count)
     omega[-1] = high if count > 1 else low
     omega[0] = low  # exp(linspace(log)) would miss 16 by an ulp

@@ -37,9 +37,9 @@ def matern_weights(omega: FloatArray, length: float) -> FloatArray:
     Oracle:  1 / Student-t density with 5 degrees of freedom and scale 1/l; mpmath.
     """
     if not length >= 0:
-        raise ValueError(f"correlation length {length}; allowed: >= 0")
+        raise ValueError(f"correlation length {length}; use a number >= 0")
     if omega.ndim != 1 or omega.size == 0 or not np.all(np.isfinite(omega) & (omega > 0)):
-        raise ValueError(f"frequencies {omega}; allowed: (F,) finite, > 0")
+        raise ValueError(f"frequencies {omega}; use finite numbers > 0 of shape (F,)")
     wide = omega.astype(np.float64)
     ratio = wide / wide.max()
     scaled = length * (2.0 * np.pi * float(wide.max()))  # l times the largest angular frequency

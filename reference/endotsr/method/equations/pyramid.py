@@ -36,7 +36,7 @@ ROWS = 16  # rows in one partial sum of magnitudes
 def expand_weights(upsampling: Upsampling) -> tuple[float, float]:
     """(even, odd) of an up-sampling rule. Raises ValueError for an unknown name."""
     if upsampling not in EXPAND_WEIGHTS:
-        raise ValueError(f"upsampling {upsampling!r}; allowed: {', '.join(EXPAND_WEIGHTS)}")
+        raise ValueError(f"upsampling {upsampling!r}; use one of {', '.join(EXPAND_WEIGHTS)}")
     return EXPAND_WEIGHTS[upsampling]
 
 

@@ -79,7 +79,7 @@ def use_threads(asked: int) -> int:
     A number above Numba's thread count (one per core) selects all threads. Raises InputError below 0.
     """
     if asked < 0:
-        raise InputError(f"--threads {asked} is not allowed; allowed: 0 (all cores) or more")
+        raise InputError(f"--threads {asked} is not allowed; use 0 (all cores) or more")
 
     most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
     used = min(asked or usable_cores(), most)

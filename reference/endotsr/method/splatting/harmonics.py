@@ -170,7 +170,7 @@ def harmonics_forward(
     dtype = position.dtype
     if not 0 <= degree <= 3 or harmonics.shape[0] < (degree + 1) ** 2:
         raise ValueError(
-            f"degree {degree} needs {(degree + 1) ** 2} coefficients, harmonics has {harmonics.shape[0]}; allowed: 0..3"
+            f"degree {degree} needs {(degree + 1) ** 2} coefficients, harmonics has {harmonics.shape[0]}; use 0..3"
         )
     centre = np.ascontiguousarray(centre, dtype)
     colour = np.empty((3, position.shape[1]), dtype)

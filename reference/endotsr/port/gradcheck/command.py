@@ -27,7 +27,7 @@ def run_gradcheck(
     pairs = definition_pairs() if definition else all_pairs()
     for name in names or ():
         if name not in pairs:
-            raise InputError(f"gradcheck: {name!r} is not a registered stage; allowed: {', '.join(pairs)}")
+            raise InputError(f"gradcheck: {name!r} is not a registered stage; use one of {', '.join(pairs)}")
     refuse_unwritable(json_path)
     chosen = [pairs[name] for name in (names or pairs)]
     reports, precisions = [], []

@@ -112,7 +112,7 @@ def pair_stream(name: str, seed: int) -> np.random.Generator:
     Raises: InputError for a seed below 0, which NumPy rejects.
     """
     if seed < 0:
-        raise InputError(f"--seed {seed} is not allowed; allowed: an integer >= 0")
+        raise InputError(f"--seed {seed} is not allowed; use an integer >= 0")
     return np.random.default_rng([seed, *name.encode()])
 
 

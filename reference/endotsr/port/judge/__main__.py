@@ -81,7 +81,7 @@ def _refuse_unwritable(options: argparse.Namespace) -> None:
     for name in ("json", "html", "certificate", "badge"):
         file = getattr(options, name, None)
         if file and (file.is_dir() or not os.access(file if file.exists() else file.parent, os.W_OK)):
-            raise InputError(f"--{name} {file}: cannot be written; allowed: a file in a folder that exists")
+            raise InputError(f"--{name} {file}: cannot be written; use a file in a folder that exists")
 
 
 def main(words: list[str]) -> int:

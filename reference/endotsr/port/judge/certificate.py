@@ -96,7 +96,7 @@ class Certificate(_Strict, frozen=True, kw_only=True):
             if len(text) > LONGEST or any(unicodedata.category(letter) in INVISIBLE for letter in text):
                 raise InputError(f"a text is longer than {LONGEST} characters or has control characters")
         if (self.profile and self.profile not in PROFILES) or any(one.profile not in PROFILES for one in self.right):
-            raise InputError(f"profile: unknown; allowed: {', '.join(PROFILES)}")
+            raise InputError(f"profile: unknown; use one of {', '.join(PROFILES)}")
         if len(self.without) > MOST_OPERATIONS or min(self.cases, self.outputs, self.machine.cores) < 1:
             raise InputError(
                 f"without, cases, outputs, cores: more than {MOST_OPERATIONS} operations, or a count below 1"

@@ -45,7 +45,7 @@ def clear_kept(root: Path) -> None:
     if foreign:
         raise InputError(
             f"--keep: {foreign[0]} was not made by `endotsr golden run` and is left alone; "
-            f"allowed: a folder without {', '.join(KEPT)}, or one of an earlier run"
+            f"use a folder without {', '.join(KEPT)}, or one of an earlier run"
         )
     for path in taken:
         shutil.rmtree(path)
@@ -99,7 +99,7 @@ def refuse_folders(outputs: Path, again: Path | None, level: int, profile: str =
 def refuse_command(command: str, seconds: float) -> None:
     """Raise InputError if a port's command lacks {requests} or {outputs}, or if it gets no time."""
     if not seconds > 0:
-        raise InputError(f"--timeout {seconds:g}; allowed: seconds above 0, or inf")
+        raise InputError(f"--timeout {seconds:g}; use seconds above 0, or inf")
     if "{requests}" not in command or "{outputs}" not in command:
         raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
 

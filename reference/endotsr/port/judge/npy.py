@@ -49,7 +49,7 @@ def header_of(data: bytes) -> Header:
     wide = data[6] > 1
     length = int.from_bytes(data[8 : 12 if wide else 10], "little")
     if length > LONGEST_HEADER:
-        raise Refused(f"header of {length} bytes; allowed: {LONGEST_HEADER}")
+        raise Refused(f"header of {length} bytes; use at most {LONGEST_HEADER}")
     start = 12 if wide else 10
     raw = data[start : start + length]
     if len(raw) < length:
@@ -57,7 +57,7 @@ def header_of(data: bytes) -> Header:
     found = _HEADER.fullmatch(raw.decode("latin-1"))
     if not found:
         if b"O'" in raw or b"|O" in raw:
-            raise Refused("object array (pickle); allowed: plain numbers")
+            raise Refused("object array (pickle); use plain numbers")
         raise Refused("header is not that of a plain array")
     shape = tuple(int(n) for n in re.findall(r"\d+", found[3]))
     return Header(start + length, found[1], found[2] == "True", shape)
@@ -90,7 +90,7 @@ def _with_open(path: Path, root: Path | None, read: Callable[[int], T]) -> T:
             raise Refused("a link that leaves the folder")
         mode = os.lstat(path).st_mode  # before opening: not every system has the flags
         if stat.S_ISLNK(mode):
-            raise Refused("a link; allowed: a regular file")
+            raise Refused("a link; use a regular file")
         if not stat.S_ISREG(mode):
             raise Refused("not a regular file")
         handle = os.open(path, FLAGS)
@@ -120,14 +120,14 @@ def _read_open(handle: int, largest: int) -> NDArray:
         header = header_of(file.read(LONGEST_HEADER + 12))
         order, kind, size = header.dtype[0], header.dtype[1], int(header.dtype[2:])
         if kind not in "fiub" or (kind, size) not in _SIZES:
-            raise Refused(f"dtype {header.dtype}; allowed: real, integer or boolean numbers")
+            raise Refused(f"dtype {header.dtype}; use real, integer or boolean numbers")
         if order == ">" or (order == "=" and np.little_endian is False):
-            raise Refused("big-endian; allowed: little-endian")
+            raise Refused("big-endian; use little-endian")
         if header.fortran and len(header.shape) > 1:
-            raise Refused("Fortran order; allowed: C order")
+            raise Refused("Fortran order; use C order")
         length = math.prod(header.shape) * size
         if length > largest:
-            raise Refused(f"shape {header.shape} has {length} bytes; allowed: {largest}")
+            raise Refused(f"shape {header.shape} has {length} bytes; use at most {largest}")
         if size_on_disk != header.offset + length:
             raise Refused(f"{size_on_disk} bytes; header and shape {header.shape} need {header.offset + length}")
         file.seek(header.offset)

@@ -95,7 +95,7 @@ class Graded(NamedTuple):
 def last_level(profile: str) -> int:
     """The highest level of a profile. Raises: InputError for an unknown one."""
     if profile not in PROFILES:
-        raise InputError(f"--profile {profile[:40]!a}: no such profile; allowed: {', '.join(PROFILES)}")
+        raise InputError(f"--profile {profile[:40]!a}: no such profile; use one of {', '.join(PROFILES)}")
     return max(PROFILES[profile].says)
 
 

@@ -41,7 +41,7 @@ def called_often(
     Raises: InputError as `called`, and for a number of runs or a level that cannot be asked.
     """
     if not 2 <= runs <= MOST_RUNS:
-        raise InputError(f"--runs {runs}; allowed: 1 to {MOST_RUNS}")
+        raise InputError(f"--runs {runs}; use 1 to {MOST_RUNS}")
     if level >= BITS and not profile:
         raise InputError("--runs: level 5 asks for the same bits; give --level 4 or less")
     level = min(asked_of(golden, only, profile, level)[1], BITS - 1)

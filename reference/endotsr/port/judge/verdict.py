@@ -96,7 +96,7 @@ def only_of(golden: Golden, only: str) -> Golden:
     cases = [case for case in golden.cases if only in ("", case.family, case.name)]
     if not cases:
         raise InputError(
-            f"--only {only[:60]!a}: no such case; allowed: {', '.join(golden.manifest.families)}, or FAMILY/CASE"
+            f"--only {only[:60]!a}: no such case; use one of {', '.join(golden.manifest.families)}, or FAMILY/CASE"
         )
     return golden._replace(cases=cases)
 

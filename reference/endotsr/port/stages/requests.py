@@ -48,7 +48,7 @@ def compositor_of(settings: Settings) -> Compositor:
     """
     asked = settings.get("_compositor", "definition")
     if asked not in COMPOSITORS:
-        raise ValueError(f"_compositor: {asked!r} is not known; allowed: {', '.join(COMPOSITORS)}")
+        raise ValueError(f"_compositor: {asked!r} is not known; use one of {', '.join(COMPOSITORS)}")
     return "blocks" if asked == "blocks" and compositing_blocks.supports(raster_of(settings)) else "definition"
 
 

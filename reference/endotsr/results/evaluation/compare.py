@@ -69,7 +69,7 @@ def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: 
             _about(method)
             _refuse_no_number(method, where)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"{where}: {error}: allowed: a file that `endotsr evaluate` wrote") from None
+        raise InputError(f"{where}: {error}: use a file that `endotsr evaluate` wrote") from None
     return methods
 
 
@@ -122,14 +122,14 @@ def _refuse_other_frames(methods: list[Method]) -> None:
     frames = _frames(first)
     for k, other in enumerate(methods[1:], start=1):
         if other.label in [method.label for method in methods[:k]]:
-            raise InputError(f"two methods are called {other.label!r}; allowed: NAME=PATH with different names")
+            raise InputError(f"two methods are called {other.label!r}; use NAME=PATH with different names")
         if _frames(other) != frames:
             raise InputError(
-                f"{other.label}: {_about(other)}; {first.label}: {_about(first)}; allowed: the same held-out frames"
+                f"{other.label}: {_about(other)}; {first.label}: {_about(first)}; use the same held-out frames"
             )
         for name, digest in other.digests.items():
             if first.digests.get(name) != digest:
-                raise InputError(f"{other.label} and {first.label}: measured on different {name}; allowed: the same")
+                raise InputError(f"{other.label} and {first.label}: measured on different {name}; use the same")
 
 
 def _frames(method: Method) -> list[int]:

@@ -97,7 +97,7 @@ def lpips(
     if a.shape != b.shape or a.ndim != 3 or a.shape[0] != 3:
         raise ValueError(f"LPIPS needs two images (3, H, W), got {a.shape} and {b.shape}")
     if input_range not in ("zero_one", "minus_one_one"):
-        raise ValueError(f"input_range {input_range!r} is not known; allowed: zero_one, minus_one_one")
+        raise ValueError(f"input_range {input_range!r} is not known; use zero_one or minus_one_one")
     if weights is None or lpips_obstacle(weights, *a.shape[1:]) is not None:
         return None
     return math.fsum(layer_distances(a, b, weights, input_range))

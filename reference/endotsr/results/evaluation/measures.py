@@ -67,7 +67,7 @@ def check_measures(names: Iterable[str], what: str = "measure") -> None:
     """Raises InputError for an unknown name; the message begins with `what`."""
     for name in names:
         if name not in MEASURES:
-            raise InputError(f"{what} {name!r} is not allowed; allowed: {', '.join(MEASURES)}")
+            raise InputError(f"{what} {name!r} is not allowed; use one of {', '.join(MEASURES)}")
 
 
 def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str) -> dict[str, Measured]:

@@ -77,7 +77,7 @@ def find_renders(folder: Path, sequence: Sequence) -> Pictures:
     wanted = shortened([sequence.names[i] for i in held_out])
     raise InputError(
         f"{folder}: {len(files)} {files[0].suffix} files cannot be paired with the {len(held_out)} held-out frames "
-        f"({wanted}); allowed: their names, their numbers, or one file for each, numbered in order"
+        f"({wanted}); use their names, their numbers, or one file for each, numbered in order"
     )
 
 
@@ -92,7 +92,7 @@ def _of_video(path: Path, sequence: Sequence) -> Pictures:
             decoded = {i: np.rot90(picture, facts.turn // 90) for i, picture in zip(frames, pictures, strict=True)}
             return Pictures(path, {i: path / str(k) for k, i in enumerate(frames)}, pairing, decoded)
     raise InputError(
-        f"{path}: a video of {facts.count} pictures; allowed: one for each of the {sequence.count} frames or of the"
+        f"{path}: a video of {facts.count} pictures; use one for each of the {sequence.count} frames or of the"
         f" {len(held_out)} held-out ones, in order"
     )
 
@@ -105,7 +105,7 @@ def _listed(folder: Path) -> list[Path]:
         files = [file for file in visible_files(folder) if file.suffix.lower() == kind]
         if files:
             return files
-    raise InputError(f"{folder}: contains no picture; allowed: one file per frame, {', '.join(KINDS)}")
+    raise InputError(f"{folder}: contains no picture; use one file per frame, {', '.join(KINDS)}")
 
 
 def _by_name(files: list[Path], sequence: Sequence) -> dict[int, Path]:
@@ -167,18 +167,18 @@ def _of_shape(picture: Array, shape: tuple[int, ...], file: Path) -> FloatArray:
         size = "x".join(map(str, picture.shape))
         is_picture = picture.ndim == len(shape) and picture.shape[0] == CHANNELS
         found = f"a picture of {picture.shape[2]}x{picture.shape[1]}" if is_picture else f"an array of {size}"
-        raise InputError(f"{file}: {found}; allowed: a picture of {shape[2]}x{shape[1]} in 3 channels")
+        raise InputError(f"{file}: {found}; use a picture of {shape[2]}x{shape[1]} in 3 channels")
     return np.ascontiguousarray(picture)
 
 
 def _read_levels(file: Path) -> FloatArray:
     pixels = stored.read_picture(file)
     if pixels.dtype.kind != "u":
-        raise InputError(f"{file}: type {pixels.dtype}; allowed: levels of 8 or 16 bits, or .npy")
+        raise InputError(f"{file}: type {pixels.dtype}; use levels of 8 or 16 bits, or .npy")
     if pixels.dtype == np.uint16 and pixels.any() and pixels.max() <= np.iinfo(np.uint8).max:
         raise InputError(
             f"{file}: 16 bits whose largest value is {pixels.max()}: levels of 8 bits, which would be divided by 65535;"
-            " allowed: levels of 8 bits stored as such, or of 16 bits up to 65535"
+            " use levels of 8 bits stored as such, or of 16 bits up to 65535"
         )
     return pixels.astype(np.float32) / np.float32(np.iinfo(pixels.dtype).max)
 
@@ -187,13 +187,13 @@ def _read_array(file: Path) -> Array:
     array = read_npy(file, LARGEST_FILE)
     if array.dtype not in (np.float32, np.float64):
         kinds = "an array of float32 or float64 in display units [0, 1]"
-        raise InputError(f"{file}: type {array.dtype}; allowed: {kinds}")
+        raise InputError(f"{file}: type {array.dtype}; use {kinds}")
     if not np.isfinite(array).all():
-        raise InputError(f"{file}: values that are not finite; allowed: display units [0, 1]")
+        raise InputError(f"{file}: values that are not finite; use display units [0, 1]")
     if array.size and np.abs(array).max() > LARGEST:
-        raise InputError(f"{file}: value {np.abs(array).max():g}; allowed: display units, from 0 to 1 (not to 255)")
+        raise InputError(f"{file}: value {np.abs(array).max():g}; use display units, from 0 to 1 (not to 255)")
     if array.size and array.min() < LOWEST:
-        raise InputError(f"{file}: value {array.min():g}; allowed: display units, from 0 to 1 (not from -1)")
+        raise InputError(f"{file}: value {array.min():g}; use display units, from 0 to 1 (not from -1)")
     return array
 
 

@@ -206,14 +206,14 @@ def _right_pictures(folder: Path, sequence: Sequence, settings: SequenceConfig) 
     files = [files[i] for i in parse_frame_range(settings.frames, len(files))]
     if len(files) != sequence.count:
         raise InputError(
-            f"{folder}: {counted(len(files), 'picture')} for {counted(sequence.count, 'frame')}; allowed: one per frame"
+            f"{folder}: {counted(len(files), 'picture')} for {counted(sequence.count, 'frame')}; use one per frame"
         )
 
     def right(index: int) -> NDArray[np.uint8]:
         file = files[index]
         pixels = colour_picture(read_picture(file), file)
         if pixels.shape[0] < height or pixels.shape[1] < width:
-            raise InputError(f"{file}: {pixels.shape[1]}x{pixels.shape[0]} pixels; allowed: at least {width}x{height}")
+            raise InputError(f"{file}: {pixels.shape[1]}x{pixels.shape[0]} pixels; use at least {width}x{height}")
         return np.ascontiguousarray(area_resize(pixels, width, height).transpose(2, 0, 1))
 
     return right

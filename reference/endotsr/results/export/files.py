@@ -20,7 +20,7 @@ from endotsr.untrusted.writing import replacing_folder
 FILM_ENDINGS = (".mp4", ".webm", ".gif", ".avi", ".mov")
 ENDING = re.compile(r"\.(?=.*[a-z])[a-z0-9]{1,8}")  # extension of a file; `run.2` and `scale_0.5` are folder names
 WRITTEN = (
-    "allowed: FILE.ply (Gaussians, points or a mesh at one time), FILE.glb (animated points), FILE.npz (a slim"
+    "use FILE.ply (Gaussians, points or a mesh at one time), FILE.glb (animated points), FILE.npz (a slim"
     " model), FILE.html (a page), or a name without an ending (a folder of .ply files)"
 )
 
@@ -48,7 +48,7 @@ def check_folder_name(out: Path, of: str, film: str = "", written: str = "") -> 
     """
     ending = out.suffix.lower()
     if ENDING.fullmatch(ending) and not out.is_dir():
-        advice = film if film and ending in FILM_ENDINGS else written or "allowed: a name without an ending"
+        advice = film if film and ending in FILM_ENDINGS else written or "use a name without an ending"
         raise InputError(f"{out}: --out is a folder of {of}, but this is the name of a {ending} file; {advice}")
 
 
@@ -66,9 +66,9 @@ def export(
     Raises: InputError for another extension, for invalid times or content, and for a path that cannot be written.
     """
     if not 0.0 <= content.least_opacity <= 1.0:
-        raise InputError(f"export: --opacity {content.least_opacity:g} is not allowed; allowed: 0 to 1")
+        raise InputError(f"export: --opacity {content.least_opacity:g} is not allowed; use 0 to 1")
     if content.voxel is not None and content.kind != "mesh":
-        raise InputError("export: --voxel applies to a mesh only; allowed: with --content mesh")
+        raise InputError("export: --voxel applies to a mesh only; use it with --content mesh")
     ending = out.suffix.lower()
     if ending in (".npz", ".glb", ".ply"):
         refuse_replacing(out, replace)
@@ -84,11 +84,9 @@ def export(
 
 def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
     if times.chosen or content != GAUSSIANS:
-        raise InputError(
-            f"{out}: a slim model stores all times and the whole scene; allowed: --out alone, or a .ply file"
-        )
+        raise InputError(f"{out}: a slim model stores all times and the whole scene; use --out alone, or a .ply file")
     if scene.one_time:
-        raise InputError(f"{out}: a slim model cannot be made from a .ply file of one time; allowed: a run folder")
+        raise InputError(f"{out}: a slim model cannot be made from a .ply file of one time; use a run folder")
     model = scene.model
     save_slim_model(out, model, scene.record)
     size = out.stat().st_size
@@ -100,7 +98,7 @@ def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
 
 def _animated(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
     if content.kind == "mesh":
-        raise InputError(f"{out}: a .glb stores points; the triangles of a mesh change over time; allowed: a folder")
+        raise InputError(f"{out}: a .glb stores points; the triangles of a mesh change over time; use a folder")
     wanted = [time for time, _, _, _ in chosen_times("export", times, scene.record, default="all")]
     count = write_animated_points(out, scene, wanted, content.least_opacity, content.taken_out)
     return f"{out}: {counted(count, 'point')} at {counted(len(wanted), 'time')}, {out.stat().st_size / 1e6:.2f} MB"
@@ -109,7 +107,7 @@ def _animated(scene: MovingScene, out: Path, times: Times, content: Content) -> 
 def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
     wanted = chosen_times("export", times if times.chosen else Times(frames="all"), scene.record)
     if times.chosen and len(wanted) > 1:
-        raise InputError(f"{out}: a .ply file stores one time, not {len(wanted)}; allowed: a folder, one time")
+        raise InputError(f"{out}: a .ply file stores one time, not {len(wanted)}; use a folder, one time")
     count = _write(scene, out, wanted[0][0], content)
     return f"{out}: {count} {_parts(content)} at time {wanted[0][0]:g}, {out.stat().st_size / 1e6:.2f} MB"
 

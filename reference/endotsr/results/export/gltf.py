@@ -63,12 +63,12 @@ def write_animated_points(
     seconds = np.multiply(times, record.duration or record.count / UNKNOWN_RATE)
     seconds = (seconds - seconds[0]).astype("<f4")
     if (np.diff(seconds) <= 0).any():
-        raise InputError(f"{file}: the times of an animation must ascend; allowed: each later than the previous one")
+        raise InputError(f"{file}: the times of an animation must ascend; use each later than the previous one")
     shown = [point_vertices(placed_scene(scene.at(t, taken_out), scene.placement), least_opacity) for t in times]
     if not shown[0].size:
-        raise InputError(f"{file}: no Gaussian has opacity {least_opacity:g} or more; allowed: a smaller --opacity")
+        raise InputError(f"{file}: no Gaussian has opacity {least_opacity:g} or more; use a smaller --opacity")
     if 12 * shown[0].size * (len(times) + 1) + 4 * len(times) ** 2 >= LARGEST:  # points and weights
-        raise InputError(f"{file}: {shown[0].size} points at {len(times)} times need more than 4 GB; allowed: --count")
+        raise InputError(f"{file}: {shown[0].size} points at {len(times)} times need more than 4 GB; use --count")
     points = [np.stack([each[axis] for axis in "xyz"], axis=1) for each in shown]
     levels = np.stack([shown[0][name] for name in ("red", "green", "blue")], axis=1)
     content = _glb(points, levels, seconds, times, record.unit)

@@ -86,7 +86,7 @@ def fused(views: list[DepthView], voxel: float | None = None) -> Mesh:
     except (RuntimeError, ValueError):  # its two ways to say that no cell holds the surface
         raise InputError(
             f"export: no surface in a grid of {'x'.join(map(str, grid.shape))} voxels of side {grid.side:.3g};"
-            " allowed: a smaller --voxel"
+            " use a smaller --voxel"
         ) from None
     vertices = grid.low + grid.side * corners
     return Mesh(vertices.astype(np.float32), faces.astype(np.int32), _colours(views, vertices, grid.side))
@@ -107,7 +107,7 @@ def _grid(views: list[DepthView], voxel: float | None) -> Grid:
         side = voxel
     else:
         raise InputError(
-            f"export: --voxel {voxel:g} is not allowed; allowed: a number > 0 for a grid of at most {MOST_VOXELS} "
+            f"export: --voxel {voxel:g} is not allowed; use a number > 0 for a grid of at most {MOST_VOXELS} "
             f"voxels; {PIXELS_A_VOXEL * float(footprint):.3g} corresponds to {PIXELS_A_VOXEL:g} pixels"
         )
     margin = TRUNCATION * side

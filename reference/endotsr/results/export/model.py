@@ -32,7 +32,7 @@ HEADER = "header"
 LARGEST_FILE = 1 << 33  # bytes, sum over all arrays
 KEPT_WHOLE = ("gaussians.position",)  # stored as float32
 HALF = np.finfo(np.float16)
-WHOLE = "allowed: a file as `endotsr export RUN --out FILE.npz` writes it"
+WHOLE = "use a file as `endotsr export RUN --out FILE.npz` writes it"
 
 
 class SlimModel(NamedTuple):
@@ -118,7 +118,7 @@ def _gaussians(entries: dict[str, NDArray], path: Path) -> Gaussians:
         if shape is not None and (shape[-1:] != (count,) or shape[:-1] != rows.get(name, shape[:-1])):
             raise InputError(
                 f"{path}: gaussians.{name} has the shape {shape};"
-                f" allowed: {count} Gaussians on the last axis, as in position"
+                f" use {count} Gaussians on the last axis, as in position"
             )
     _refuse_odd_shapes(found, path)
     return Gaussians(**found)
@@ -132,17 +132,17 @@ def _refuse_odd_shapes(found: dict[str, NDArray], path: Path) -> None:
     if len(shapes) > 1 or (shape is not None and (len(shape) != 3 or shape[0] != DEFORMATION_CHANNELS)):
         shown = ", ".join("none" if array is None else str(array.shape) for array in fdm)
         raise InputError(
-            f"{path}: gaussians.fdm_weight, fdm_centre and fdm_width have the shapes {shown}; allowed: one shape,"
+            f"{path}: gaussians.fdm_weight, fdm_centre and fdm_width have the shapes {shown}; use one shape,"
             f" ({DEFORMATION_CHANNELS}, bases, Gaussians)"
         )
     if found["harmonics"].shape[:-1] not in [(k, 3) for k in (1, 4, 9, 16)]:
         shown = found["harmonics"].shape
-        raise InputError(f"{path}: gaussians.harmonics has the shape {shown}; allowed: (1, 4, 9 or 16, 3, Gaussians)")
+        raise InputError(f"{path}: gaussians.harmonics has the shape {shown}; use (1, 4, 9 or 16, 3, Gaussians)")
     for name in ("appearance_coefficients", "motion_coefficients"):
         array = found[name]
         if array is not None and (array.ndim != 3 or array.shape[0] != 3 or array.shape[1] % 2):
             raise InputError(
-                f"{path}: gaussians.{name} has the shape {array.shape}; allowed: (3, 2 x frequencies, Gaussians)"
+                f"{path}: gaussians.{name} has the shape {array.shape}; use (3, 2 x frequencies, Gaussians)"
             )
 
 
@@ -154,7 +154,7 @@ def _refuse_other_settings(found: Gaussians, model: ModelConfig, path: Path) -> 
     for key, value in seen:
         if getattr(model, key) != value:
             raise InputError(
-                f"{path}: model.{key} = {getattr(model, key)}, but its arrays have {value}; allowed: settings and"
+                f"{path}: model.{key} = {getattr(model, key)}, but its arrays have {value}; use settings and"
                 " arrays of one run"
             )
 
@@ -191,7 +191,7 @@ def _entry(entries: dict[str, NDArray], name: str, path: Path) -> Any:
     if array is None:
         return None
     if array.dtype not in (np.float16, np.float32):
-        raise InputError(f"{path}: {name} has type {array.dtype}; allowed: float16, float32")
+        raise InputError(f"{path}: {name} has type {array.dtype}; use float16 or float32")
     if not np.isfinite(array).all():
-        raise InputError(f"{path}: {name} has numbers that are not finite; allowed: finite ones")
+        raise InputError(f"{path}: {name} has numbers that are not finite; use finite ones")
     return np.ascontiguousarray(array, np.float32)

@@ -26,9 +26,9 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         raise
     except (RefusedArray, KeyError) as error:
         reason = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
-        raise InputError(f"{path}: not a trained scene: {reason}; allowed: an npz with {', '.join(ARRAYS)}") from None
+        raise InputError(f"{path}: not a trained scene: {reason}; use an npz with {', '.join(ARRAYS)}") from None
     for name, rest in ARRAYS.items():
         expected = (*(found["xyz"].shape[:1] or (0,)), *rest)
         if found[name].shape != expected:
-            raise InputError(f"{path}: {name} has shape {found[name].shape}; allowed: {expected}")
+            raise InputError(f"{path}: {name} has shape {found[name].shape}; use {expected}")
     return found

@@ -132,9 +132,7 @@ def read_gaussians_noted(path: Path) -> tuple[Gaussians, list[str]]:
     try:
         found = _gaussians(vertices)
     except KeyError as error:
-        raise InputError(
-            f"{path}: property {error.args[0]} is missing; allowed: a 3-D Gaussian splatting file"
-        ) from None
+        raise InputError(f"{path}: property {error.args[0]} is missing; use a 3-D Gaussian splatting file") from None
     except ValueError as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
     if "filter_3D" in names:

@@ -72,15 +72,15 @@ class MovingScene:
         Raises: InputError for a time, frame or component that does not exist.
         """
         if not 0.0 <= time <= 1.0:
-            raise InputError(f"render: time = {time!r} is not allowed; allowed: a number in [0, 1]")
+            raise InputError(f"render: time = {time!r} is not allowed; use a number in [0, 1]")
         for name in taken_out:
             if name not in COMPONENTS:
-                raise InputError(f"render: without = {name!r} is not allowed; allowed: {', '.join(COMPONENTS)}")
+                raise InputError(f"render: without = {name!r} is not allowed; use one of {', '.join(COMPONENTS)}")
         if not isinstance(camera, Camera):
             frame, last = nearest_frame(self.record.times, time) if camera is None else camera, self.record.count - 1
             if not isinstance(frame, Integral) or not 0 <= int(frame) <= last:
                 allowed = f"a Camera, or a frame from 0 to {last}"
-                raise InputError(f"render: camera = {camera!r} is not allowed; allowed: {allowed}")
+                raise InputError(f"render: camera = {camera!r} is not allowed; use {allowed}")
             camera = self.cameras[int(frame)]
         return self.render(float(time), camera, taken_out)
 
@@ -103,7 +103,7 @@ def open_scene(path: Path) -> MovingScene:
         slim = load_slim_model(path)
         return MovingScene(slim.record, slim.model)
     if path.is_file():
-        raise InputError(f"{path}: not a scene; allowed: a run folder, a slim model (.npz) or a 3DGS file (.ply)")
+        raise InputError(f"{path}: not a scene; use a run folder, a slim model (.npz) or a 3DGS file (.ply)")
     folder = open_run(path)
     return MovingScene(folder.sequence_record(), folder=folder)
 

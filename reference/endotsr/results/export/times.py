@@ -39,18 +39,18 @@ def chosen_times(
         times = list(request.times) or _even(command, request.count or 0)
         for time in times:
             if not 0.0 <= time <= 1.0:
-                raise InputError(f"{command}: --times {time:g} is not allowed; allowed: times in [0, 1]")
+                raise InputError(f"{command}: --times {time:g} is not allowed; use times in [0, 1]")
         known = record.times
         nearest = [nearest_frame(known, t) for t in times]
         return [(t, i, f"{k:05d}", known[i] == t) for k, (t, i) in enumerate(zip(times, nearest))]
     every = range(record.count)
     chosen = {"test": record.test_index, "train": record.train_index, "all": every}[request.frames or default]
     if not chosen:
-        raise InputError(f"{command}: no frame is held out; allowed: --frames train or all, --times, --count")
+        raise InputError(f"{command}: no frame is held out; use --frames train or all, --times, --count")
     return [(record.times[i], i, record.names[i], True) for i in chosen]
 
 
 def _even(command: str, count: int) -> list[float]:
     if count < 1:
-        raise InputError(f"{command}: --count {count} is not allowed; allowed: an integer >= 1")
+        raise InputError(f"{command}: --count {count} is not allowed; use an integer >= 1")
     return [i / max(count - 1, 1) for i in range(count)]

@@ -72,7 +72,7 @@ def _write_pictures(
     """renders/<name>.png and <name>_comparison.png; test/ours_<iteration>/{renders,gt,masks} with the peers' names."""
     peers = folder.path / "test" / f"ours_{iteration}"
     if peers.parent.is_symlink():
-        raise InputError(f"{peers.parent}: is a link; allowed: a folder of the run")
+        raise InputError(f"{peers.parent}: is a link; use a folder of the run")
     peers.parent.mkdir(exist_ok=True)
     with replacing_folder(folder.path / "renders") as renders, replacing_folder(peers) as test:
         for name in ("renders", "gt", "masks"):

@@ -87,13 +87,13 @@ def read_cameras(file: Path, like: Camera) -> list[Camera]:
     """
     entries = read_json(Path(file)).get("cameras")
     if not isinstance(entries, list) or not entries:
-        raise InputError(f'{file}: key cameras is missing; allowed: {{"cameras": [{{"rotation": ...}}, ...]}}')
+        raise InputError(f'{file}: key cameras is missing; use {{"cameras": [{{"rotation": ...}}, ...]}}')
     return [_camera(entry, like, f"{file}: cameras[{k}]") for k, entry in enumerate(entries)]
 
 
 def _camera(entry: Any, like: Camera, where: str) -> Camera:
     if not isinstance(entry, dict):
-        raise InputError(f"{where}: {type(entry).__name__}; allowed: an object with rotation and translation")
+        raise InputError(f"{where}: {type(entry).__name__}; use an object with rotation and translation")
     lens = {key: getattr(like, key) for key in ("fx", "fy", "cx", "cy", "width", "height")}
     found = typed(lens | entry, RecordedCamera, where).camera
     for key in ("width", "height"):
@@ -104,7 +104,7 @@ def _camera(entry: Any, like: Camera, where: str) -> Camera:
 def checked_side(side: Any, where: str) -> None:
     """Raises InputError if `side` is no valid number of pixels."""
     if isinstance(side, bool) or not isinstance(side, int) or not 1 <= side <= LARGEST_SIDE:
-        raise InputError(f"{where} = {side!r} is not allowed; allowed: an integer from 1 to {LARGEST_SIDE}")
+        raise InputError(f"{where} = {side!r} is not allowed; use an integer from 1 to {LARGEST_SIDE}")
 
 
 def along(cameras: list[Camera], count: int) -> list[Camera]:

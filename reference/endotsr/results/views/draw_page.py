@@ -26,7 +26,7 @@ TEMPLATE, SCRIPT = "draw.html", "draw.js"
 def check_draw_page(file: Path) -> None:
     """Raises InputError for a name that is no page."""
     if file.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{file}: not a page; allowed: a name that ends in .html")
+        raise InputError(f"{file}: not a page; use a name that ends in .html")
 
 
 def write_draw_page(file: Path, drawing: DrawnClip, title: str, command: str) -> None:

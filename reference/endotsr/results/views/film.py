@@ -27,15 +27,15 @@ HUNDREDTHS = 100  # units of time per second in a gif
 def check_film(file: Path, rate: float | None = None, slow: float | None = None) -> None:
     """Raises InputError for a wrong extension, an invalid rate or slow-down, or a missing encoder."""
     if file.suffix.lower() not in KINDS:
-        raise InputError(f"{file}: not a film; allowed: a name that ends in {', '.join(KINDS)}")
+        raise InputError(f"{file}: not a film; use a name that ends in {', '.join(KINDS)}")
     if rate is not None and slow is not None:
-        raise InputError("render: --rate with --slow: both set the speed of the film; allowed: one of them")
+        raise InputError("render: --rate with --slow: both set the speed of the film; use one of them")
     highest = _highest(file)
     if rate is not None and not LOWEST <= rate <= highest:
         allowed = f"{LOWEST:g} to {highest} pictures per second"
-        raise InputError(f"render: --rate {rate:g} is not allowed; allowed: {allowed}")
+        raise InputError(f"render: --rate {rate:g} is not allowed; use {allowed}")
     if slow is not None and not 0 < slow < float("inf"):
-        raise InputError(f"render: --slow {slow:g} is not allowed; allowed: a number > 0")
+        raise InputError(f"render: --slow {slow:g} is not allowed; use a number > 0")
     if file.suffix.lower() != ".gif":
         from endotsr.clips.formats.film_file import encoder_of
 
@@ -57,14 +57,14 @@ def film_rate(file: Path, times: list[float], duration: float, slow: float | Non
         if slow is not None:
             order = "one picture has no speed" if len(times) < 2 else "the pictures are not in order of time"
             unknown = order if duration else "the recording's frame rate is unknown"
-            raise InputError(f"render: --slow {slow:g}: {unknown}; allowed: --rate, pictures per second")
+            raise InputError(f"render: --slow {slow:g}: {unknown}; use --rate, pictures per second")
         return UNKNOWN_RATE
     own = (len(times) - 1) / seconds
     if slow is None:
         return min(max(own, USUAL[0]), min(USUAL[1], _highest(file)))
     if not LOWEST <= own / slow <= _highest(file):
         raise InputError(
-            f"render: --slow {slow:g} gives {own / slow:.3g} pictures per second; allowed: --slow from"
+            f"render: --slow {slow:g} gives {own / slow:.3g} pictures per second; use --slow from"
             f" {own / _highest(file):.3g} to {own / LOWEST:.3g} with {len(times)} pictures (--count), or --rate"
         )
     return own / slow

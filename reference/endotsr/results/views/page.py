@@ -38,9 +38,9 @@ TEMPLATE, SCRIPT = "viewer.html", "viewer.js"
 def check_page(file: Path, keys: int) -> None:
     """Raises InputError for a wrong extension or an invalid number of key times."""
     if file.suffix.lower() not in PAGE_ENDINGS:
-        raise InputError(f"{file}: not a page; allowed: a name that ends in .html")
+        raise InputError(f"{file}: not a page; use a name that ends in .html")
     if not 2 <= keys <= MOST_KEYS:
-        raise InputError(f"export: --keys {keys} is not allowed; allowed: an integer from 2 to {MOST_KEYS}")
+        raise InputError(f"export: --keys {keys} is not allowed; use an integer from 2 to {MOST_KEYS}")
 
 
 def write_page(file: Path, scene: MovingScene, title: str, keys: int, sequence: Sequence | None = None) -> int:

@@ -73,16 +73,16 @@ def check_panels(panels: tuple[Panel, ...], views: list[PlannedView]) -> None:
     views   of a film, whose pictures have one size
     """
     if not panels:
-        raise InputError("render: --panels is empty; allowed: one or more of render, truth, error, depth, opacity")
+        raise InputError("render: --panels is empty; use one or more of render, truth, error, depth, opacity")
     sizes = [f"{width}x{height}" for width, height in dict.fromkeys((v.camera.width, v.camera.height) for v in views)]
     if len(sizes) > 1:
-        raise InputError(f"render: --film: views of {', '.join(sizes[:3])}; allowed: one size (--size WIDTHxHEIGHT)")
+        raise InputError(f"render: --film: views of {', '.join(sizes[:3])}; use one size (--size WIDTHxHEIGHT)")
     needed = [name for name in panels if name in NEEDS_TRUTH]
     moved = next((view for view in views if not view.exact), None)
     if needed and moved is not None:
         raise InputError(
             f"render: --panels {needed[0]} at time {moved.time:g}: no frame has this time and camera; "
-            "allowed: the times of frames (--frames), --camera observed, no --offset and no --size"
+            "use the times of frames (--frames), --camera observed, no --offset and no --size"
         )
 
 
@@ -116,7 +116,7 @@ def check_outputs(
     option    that names the film, for the message; empty in Python
     """
     if out is None and film is None:
-        raise InputError("render: --out DIR or --film FILE is missing; allowed: one or both")
+        raise InputError("render: --out DIR or --film FILE is missing; use one or both")
     if out is not None:
         check_folder_name(out, "pictures", film="--film FILE writes a film")
         refuse_existing(out)
@@ -137,7 +137,7 @@ def frames_shown(
     if not set(panels) & set(NEEDS_TRUTH):
         return None
     if scene.folder is None:
-        raise InputError("render: --panels truth and error need the frames of a run folder; allowed: a run folder")
+        raise InputError("render: --panels truth and error need the frames of a run folder; use a run folder")
     return load_run_sequence(scene.folder, source)
 
 

@@ -41,15 +41,15 @@ def check_request(request: ViewRequest, count: int) -> None:
     if request.size:
         read_size(request.size)
     if not 0.0 <= request.angle <= LARGEST_ANGLE:
-        raise InputError(f"render: --angle {request.angle:g} is not allowed; allowed: 0 to {LARGEST_ANGLE:g} degrees")
+        raise InputError(f"render: --angle {request.angle:g} is not allowed; use 0 to {LARGEST_ANGLE:g} degrees")
     if not all(math.isfinite(number) for number in request.offset):
-        raise InputError("render: --offset is not allowed; allowed: three finite numbers")
+        raise InputError("render: --offset is not allowed; use three finite numbers")
     camera = request.camera
     if camera.removeprefix("-").isdecimal() and not 0 <= int(camera) < count:
-        raise InputError(f"render: --camera {camera} is not allowed; allowed: a frame from 0 to {count - 1}")
+        raise InputError(f"render: --camera {camera} is not allowed; use a frame from 0 to {count - 1}")
     if not (camera in PATHS or camera.isdecimal() or camera.lower().endswith(".json")):
         allowed = f"{', '.join(PATHS)}, the number of a frame, or a JSON file of cameras"
-        raise InputError(f"render: --camera {camera!r} is not allowed; allowed: {allowed}")
+        raise InputError(f"render: --camera {camera!r} is not allowed; use {allowed}")
 
 
 def planned_views(
@@ -98,7 +98,7 @@ def read_size(text: str) -> tuple[int, int]:
     """Width and height of `WIDTHxHEIGHT`. Raises InputError."""
     width, cross, height = text.lower().partition("x")
     if not (cross and width.isdecimal() and height.isdecimal()):
-        raise InputError(f"render: --size {text!r} is not allowed; allowed: WIDTHxHEIGHT, for example 1280x1024")
+        raise InputError(f"render: --size {text!r} is not allowed; use WIDTHxHEIGHT, for example 1280x1024")
     for side in (width, height):
         checked_side(int(side), f"render: --size {text}: side")
     return int(width), int(height)

@@ -56,7 +56,7 @@ class StageClock:
     def stage(self, name: str) -> Iterator[None]:
         """Assign the time of the block to the stage `name`. Raises: KeyError for an unknown stage."""
         if name not in STAGES:
-            raise KeyError(f"unknown stage {name!r}; allowed: {', '.join(STAGES)}")
+            raise KeyError(f"unknown stage {name!r}; use one of {', '.join(STAGES)}")
         thread = threading.get_ident()
         with self._lock:
             self._charge()

@@ -160,7 +160,7 @@ def _connected(address: str) -> Iterator[Any]:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TypeError):
         raise InputError(
-            f"--scheduler {address}: no Dask scheduler answers; allowed: the address of a running one, such as "
+            f"--scheduler {address}: no Dask scheduler answers; use the address of a running one, such as "
             "tcp://127.0.0.1:8786 (`dask scheduler` prints it)"
         ) from None
     try:
@@ -178,16 +178,16 @@ def _refuse_workers(client: Any, out: Path) -> None:
         raise InputError("--scheduler: no workers; start some with `dask worker ADDRESS --nthreads 1`") from None
     for worker, count in client.nthreads().items():
         if count != 1:
-            raise InputError(f"worker {worker}: has {count} threads; allowed: --nthreads 1")
+            raise InputError(f"worker {worker}: has {count} threads; use --nthreads 1")
     token, expected = secrets.token_hex(8), _fingerprint()
     (out / TOKEN).write_text(token, encoding="ascii", newline="\n")
     for worker, found in client.run(_seen, str(out / TOKEN), on_error="return").items():
         if isinstance(found, BaseException):
-            raise InputError(f"worker {worker}: cannot load endotsr: {plain_line(repr(found))}; allowed: {expected}")
+            raise InputError(f"worker {worker}: cannot load endotsr: {plain_line(repr(found))}; use {expected}")
         if wrong := _difference(found[0], expected):
             raise InputError(f"worker {worker}: {wrong}")
         if found[1] != token:
-            raise InputError(f"worker {worker}: cannot read {out}; allowed: an --out on a disk shared by all machines")
+            raise InputError(f"worker {worker}: cannot read {out}; use an --out on a disk shared by all machines")
     (out / TOKEN).unlink(missing_ok=True)
 
 
@@ -213,4 +213,4 @@ def _difference(found: dict[str, str], expected: dict[str, str]) -> str:
     """The differing versions as text; "" if there are none."""
     wrong = [name for name in expected if found.get(name) != expected[name]]
     shown = ", ".join(f"{name} {found.get(name, 'is missing')} (here {expected[name]})" for name in wrong)
-    return f"has other versions: {shown}; allowed: those of this machine" if wrong else ""
+    return f"has other versions: {shown}; use those of this machine" if wrong else ""

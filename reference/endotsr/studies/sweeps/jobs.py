@@ -86,7 +86,7 @@ def sequence_names(sources: tuple[str, ...]) -> dict[str, str]:
     for source, name in names.items():
         twice = [other for other in sources if other != source and names[other] == name]
         if twice:
-            raise InputError(f"{source} and {twice[0]}: two sequences are called {name}; allowed: different names")
+            raise InputError(f"{source} and {twice[0]}: two sequences are called {name}; use different names")
     return names
 
 
@@ -105,7 +105,7 @@ def jobs_of(spec: Spec, out: Path, training_frames: Callable[[Job], int]) -> lis
     seen: set[str] = set()
     for job in jobs:
         if job.name.lower() in seen:
-            raise InputError(f"{job.name}: two runs have this name; allowed: names that differ in more than case")
+            raise InputError(f"{job.name}: two runs have this name; use names that differ in more than case")
         seen.add(job.name.lower())
     return jobs
 
@@ -192,7 +192,7 @@ def refuse_other_settings(job: Job, folder: RunFolder) -> None:
     for key, value in ours.items():
         if theirs[key] != value and key not in ("preset", "training.threads"):
             raise InputError(
-                f"{folder.path}: contains a run with {key} = {theirs[key]!r}, but the sweep has {value!r}; allowed: the"
+                f"{folder.path}: contains a run with {key} = {theirs[key]!r}, but the sweep has {value!r}; use the"
                 " original settings of the sweep, or another --out"
             )
 

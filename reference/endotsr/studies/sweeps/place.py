@@ -50,7 +50,7 @@ def check_place(command: str, place: Place) -> None:
     for name in ("workers", "threads"):
         value = getattr(place, name)
         if value is not None and value < 1:
-            raise InputError(f"{command}: --{name} {value} is not allowed; allowed: an integer >= 1")
+            raise InputError(f"{command}: --{name} {value} is not allowed; use an integer >= 1")
     if place.scheduler is not None and place.workers is not None:
         raise InputError(f"{command}: --workers with --scheduler is not allowed: the cluster has its own workers")
 

@@ -111,7 +111,7 @@ def failures(out: Path) -> dict[str, str]:
         return {}
     found = read_json(path, ("rows", "format"))
     if found["format"] != FORMAT or not isinstance(found["rows"], list):
-        raise InputError(f"{path}: not the results of this version; allowed: a file that `endotsr sweep` wrote")
+        raise InputError(f"{path}: not the results of this version; use a file that `endotsr sweep` wrote")
     rows = [row for row in found["rows"] if isinstance(row, dict) and row.get("status") == FAILED]
     return {str(row.get("name")): str(row.get("reason", "")) for row in rows}
 

@@ -27,14 +27,14 @@ from endotsr.errors import InputError
 from endotsr.results.evaluation.measures import check_measures
 from endotsr.training.runs.sources import SIMULATED
 from endotsr.untrusted.json import Keys, Text, integer
-from endotsr.untrusted.sections import Section, checked, refuse_unknown_keys
+from endotsr.untrusted.sections import Section, checked, choice, refuse_unknown_keys
 from endotsr.untrusted.toml import by_key, read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9+_. -]{0,60}")
 SPLITS = get_args(next(field.type for field in msgspec.structs.fields(SequenceConfig) if field.name == "split"))
 NEEDED = {  # what a file lacks -> what to write
-    "sequences": 'allowed: a list of folders, such as sequences = ["my_sequence"]',
-    "configurations": "allowed: one or more, such as the line [configurations.base] for the settings without a change",
+    "sequences": 'use a list of folders, such as sequences = ["my_sequence"]',
+    "configurations": "use one or more, such as the line [configurations.base] for the settings without a change",
 }
 LONGEST_BLOCK = 1 << 20  # frames
 Seed = Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
@@ -122,7 +122,7 @@ def spec_of(data: Keys, where: str, folder: Path) -> Spec:
     check_measures(file.measures, f"{where}: measures =")
     for key, values in (("sequences", sequences), ("seeds", file.seeds), ("splits", splits)):
         if len(set(values)) < len(values):
-            raise InputError(f"{where}: {key}: duplicate entry; allowed: each once")
+            raise InputError(f"{where}: {key}: duplicate entry; use each once")
     made, lpips = _configurations(file, where), None if file.lpips is None else str(folder / file.lpips)
     return Spec(sequences, file.seeds, splits, made, file.simulator, file.measures, lpips, file.keep_checkpoints)
 
@@ -144,19 +144,19 @@ def _configurations(file: SpecFile, where: str) -> tuple[Configuration, ...]:
     for name, start in starts.items():
         here = f"{where}: configurations.{name}.start"
         if start and start.configuration not in starts:
-            allowed = ", ".join(starts)
-            raise InputError(f"{here}.configuration = {start.configuration!r} is not allowed; allowed: {allowed}")
+            allowed = choice(starts)
+            raise InputError(f"{here}.configuration = {start.configuration!r} is not allowed; use {allowed}")
         if start and starts[start.configuration]:
-            raise InputError(f"{here}: {start.configuration} has its own start; allowed: a configuration without start")
+            raise InputError(f"{here}: {start.configuration} has its own start; use a configuration without start")
     return made
 
 
 def _configuration(name: str, values: Any, file: SpecFile, where: str) -> Configuration:
     here = f"{where}: configurations.{name}"
     if not NAME.fullmatch(name):
-        raise InputError(f"{here}: the name is not allowed; allowed: letters, digits, space, + - _ . (at most 61)")
+        raise InputError(f"{here}: the name is not allowed; use letters, digits, space, + - _ . (at most 61)")
     if not isinstance(values, dict):
-        raise InputError(f"{here} = {values!r} is not allowed; allowed: a table of keys")
+        raise InputError(f"{here} = {values!r} is not allowed; use a table of keys")
     own = ConfigurationKeys.__struct_fields__
     keys = checked({key: value for key, value in values.items() if key in own}, ConfigurationKeys, here)
     config = config_from_dict({"preset": file.preset if keys.preset is None else keys.preset}, here)
@@ -174,12 +174,12 @@ def _refuse_overridden(changes: Keys, file: SpecFile, where: str) -> None:
     """Raises InputError for a setting that the seeds and splits of the sweep replace in every run."""
     for key, instead in (("training.seed", "seeds"), ("sequence.split", "splits")):
         if key in by_key(changes) and getattr(file, instead):
-            raise InputError(f"{where}: {key} has no effect: {instead} sets it in every run; allowed: {instead} alone")
+            raise InputError(f"{where}: {key} has no effect: {instead} sets it in every run; use {instead} alone")
 
 
 def _changed(config: Config, changes: Keys, where: str) -> Config:
     if "preset" in changes:
-        raise InputError(f"{where}: settings.preset is not allowed; allowed: preset next to settings")
+        raise InputError(f"{where}: settings.preset is not allowed; use preset next to settings")
     changes = without_former_keys(changes, where, config.training.bridge_fraction)
     refuse_unknown_keys(changes, Config, where)
     return config_from_dict(merged(msgspec.to_builtins(config), changes), where)
@@ -187,11 +187,11 @@ def _changed(config: Config, changes: Keys, where: str) -> Config:
 
 def _split(word: str, where: str) -> str:
     name, space, length = word.partition(" ")
-    allowed = ", ".join(f"{s} N" if s in ("blocks", "end") else s for s in SPLITS)
+    allowed = choice(f"{s} N" if s in ("blocks", "end") else s for s in SPLITS)
     if name not in SPLITS or (name in ("blocks", "end")) != bool(space):
-        raise InputError(f"{where}: splits = {word!r} is not allowed; allowed: {allowed}")
+        raise InputError(f"{where}: splits = {word!r} is not allowed; use {allowed}")
     if space and not (length.isascii() and length.isdigit() and 1 <= int(length) <= LONGEST_BLOCK):
-        raise InputError(f"{where}: splits = {word!r} is not allowed; allowed: {allowed}, with N >= 1")
+        raise InputError(f"{where}: splits = {word!r} is not allowed; use {allowed}, with N >= 1")
     return f"{name} {int(length)}" if space else name
 
 
@@ -204,5 +204,5 @@ def _source(word: str, where: str, folder: Path) -> str:
     except (OSError, RuntimeError):  # a name that is too long, or a cycle of links
         found, there = folder, False
     if not there:
-        raise InputError(f"{where}: sequences = {word!r} is not allowed; allowed: a folder, or {SIMULATED}")
+        raise InputError(f"{where}: sequences = {word!r} is not allowed; use a folder, or {SIMULATED}")
     return str(found)

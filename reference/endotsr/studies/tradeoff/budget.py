@@ -50,7 +50,7 @@ def parse_budget(text: str) -> Budget:
         else:
             found = Budget("frame", amount * FACTORS[unit], text)
     if found is None or not 0 < found.amount < math.inf:
-        raise InputError(f"--budget {text!r} is not understood; allowed: {FORMS}, each finite and > 0")
+        raise InputError(f"--budget {text!r} is not understood; use {FORMS}, each finite and > 0")
     return found
 
 

@@ -142,7 +142,7 @@ def read_splats(path: Path) -> Gaussians:
     """The Gaussians of a file, float32, without those that are not finite. Raises InputError."""
     kind = path.suffix.lower()
     if kind not in (".ply", ".npz"):
-        raise InputError(f"{path}: not a splat file; allowed: a name that ends in .ply or .npz")
+        raise InputError(f"{path}: not a splat file; use a name that ends in .ply or .npz")
     if kind == ".ply":
         return read_gaussians(path)
     data = read_arrays(path)

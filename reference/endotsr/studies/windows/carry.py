@@ -86,7 +86,7 @@ class Neighbour(NamedTuple):
         """Index of the join among the training frames of the window."""
         shared = sequence.train_index[sequence.train_index < self.shared]
         if not shared.size:
-            raise InputError("windows: the overlap contains no training frame; allowed: a larger --overlap")
+            raise InputError("windows: the overlap contains no training frame; use a larger --overlap")
         return int(np.abs(shared - (self.shared - 1) / 2).argmin())
 
 
@@ -121,7 +121,7 @@ def _refuse_other_world(sequence: Sequence, camera: Camera, folder: str) -> None
     """Raises InputError if the camera of the window's first frame differs from the neighbour's."""
     depth = sequence.tissue_depth(0) or 1.0
     if np.abs(sequence.cameras[0].translation - camera.translation).max() > CAMERA_TOLERANCE * depth:
-        raise InputError(f"{folder}: its world origin differs from the next window's; allowed: windows that start cold"
+        raise InputError(f"{folder}: its world origin differs from the next window's; use windows that start cold"
                          " (--chain 1), or poses near the origin")  # fmt: skip
 
 

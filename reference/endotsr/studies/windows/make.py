@@ -185,7 +185,7 @@ def frame_range(selected: str, window: Window) -> str:
     words = [int(word) if word.strip() else None for word in selected.split(":")] if selected.strip() else []
     first, _, step = (*words, None, None, None)[:3]
     if (first or 0) < 0:
-        raise InputError(f"train: --frames {selected!r} with --windows: allowed: a first frame that is not negative")
+        raise InputError(f"train: --frames {selected!r} with --windows: use a first frame that is not negative")
     first, step = first or 0, step or 1
     return f"{first + window.first * step}:{first + (window.end - 1) * step + 1}:{step}"
 

@@ -105,7 +105,7 @@ def _refuse_other_files(folder: Path) -> None:
     other = [name for name in names if not fullmatch(r"\d+\.js", name)]
     if other:
         found = f"{folder}: holds {plain_line(min(other))}, which is no window of a page"
-        raise InputError(f"{found}; allowed: another name of the page")
+        raise InputError(f"{found}; use another name of the page")
 
 
 def _part(scene: WindowedScene, k: int, keys: int, sequence: Sequence | None, folder: str) -> PagePart:

@@ -50,12 +50,12 @@ def check_wanted(wanted: Wanted, split: SequenceConfig) -> None:
     """Raises InputError for an invalid length, overlap or chain, and for the split `end`."""
     least = wanted.overlap + _least_stride(wanted, split_period(split))
     if wanted.chain < 1:
-        raise InputError(f"train: --chain {wanted.chain} is not allowed; allowed: an integer >= 1")
+        raise InputError(f"train: --chain {wanted.chain} is not allowed; use an integer >= 1")
     if wanted.overlap < 2:
-        raise InputError(f"train: --overlap {wanted.overlap} is not allowed; allowed: an integer >= 2")
+        raise InputError(f"train: --overlap {wanted.overlap} is not allowed; use an integer >= 2")
     if wanted.frames is not None and wanted.frames < least:
         raise InputError(
-            f"train: --windows {wanted.frames} is not allowed; allowed: auto, or at least {least} frames with an"
+            f"train: --windows {wanted.frames} is not allowed; use auto, or at least {least} frames with an"
             f" overlap of {wanted.overlap} (no frame may be in three windows)"
         )
 
@@ -68,7 +68,7 @@ def _least_stride(wanted: Wanted, period: int) -> int:
 def split_period(split: SequenceConfig) -> int:
     """Period of the split, frames. Raises InputError for the split `end`, which has none."""
     if split.split == "end":
-        raise InputError("train: --windows with the split end: every window would hold out its end; allowed: others")
+        raise InputError("train: --windows with the split end: every window would hold out its end; use others")
     periods = {"every_eighth": 8, "every_second": 2, "blocks": max(LEAST_BLOCK_PERIOD, 2 * split.block_length)}
     return periods[split.split]
 

@@ -82,7 +82,7 @@ def read_record(run: Path) -> WindowsRecord:
     path = Path(run) / FILE
     record = typed(read_json(path), WindowsRecord, path)
     if not record.windows:
-        raise InputError(f"{path}: windows: there is none; allowed: at least one")
+        raise InputError(f"{path}: windows: there is none; use at least one")
     for k, window in enumerate(record.windows):
         if wrong := _wrong(record, k, window):
             raise InputError(f"{path}: windows: {plain_line(window.name)}: {wrong}")
@@ -93,13 +93,13 @@ def _wrong(record: WindowsRecord, k: int, window: Window) -> str:
     """The fault of a window, as text; "" if it is valid."""
     windows = record.windows
     if window.name != f"{k:03d}":
-        return f"allowed: the name {k:03d}, in the order of the frames"
+        return f"use the name {k:03d}, in the order of the frames"
     if not window.first < window.end <= record.frames:
-        return f"frames {window.first}:{window.end}; allowed: first < end <= {record.frames}"
+        return f"frames {window.first}:{window.end}; use frames with first < end <= {record.frames}"
     if k and not (windows[k - 1].first < window.first and windows[k - 1].end < window.end):
         return "begins or ends no later than the previous window"
     if k > 1 and windows[k - 2].end > window.first:
-        return f"shares frames with window {k - 2:03d}; allowed: only with its neighbours"
+        return f"shares frames with window {k - 2:03d}; a window shares frames with its neighbours only"
     if window.start == "warm" and not record.shared(k):
         return "starts warm but shares no frame with the previous window"
     return ""

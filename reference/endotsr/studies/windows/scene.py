@@ -166,7 +166,7 @@ def refuse_one_set(path: Path, out: Path) -> None:
     """Raises InputError if a run of windows is to be exported to a format for one set of Gaussians."""
     if is_windowed(path) and out.suffix.lower() in (".npz", ".glb"):
         raise InputError(
-            f"{out}: this format stores one set of Gaussians, but {path} has one per window; allowed: .ply files, a"
+            f"{out}: this format stores one set of Gaussians, but {path} has one per window; use .ply files, a"
             f" page, or the run of a window, {path / FOLDER / '000'}"
         )
 

@@ -57,7 +57,7 @@ def survey(source: Path, config: SequenceConfig) -> list[SurveyedFrame]:
     """
     clip = without_faults(describe_for_training(source, config))
     if clip.arbitrary:
-        raise InputError(f"{source}: its unit is arbitrary, so each window would have its own scale; allowed: mm")
+        raise InputError(f"{source}: its unit is arbitrary, so each window would have its own scale; use mm")
     try:
         frames = parse_frame_range(config.frames, clip.count)
     except InputError as error:

@@ -267,7 +267,7 @@ def _assemble(path: Path, description: Description, entries: dict[str, NDArray])
         if statistics.visits.shape != (gaussians.count,) or statistics.gradient_sum.shape != (gaussians.count,):
             raise ValueError(f"statistics: not one entry for each of {gaussians.count} Gaussians")
         if statistics.visits.dtype != np.int64 or statistics.gradient_sum.dtype != np.float64:
-            raise ValueError("statistics: allowed: int64 visits and float64 gradient_sum")
+            raise ValueError("statistics: use int64 visits and float64 gradient_sum")
         check_numbers(gaussians, adam, statistics, frames)
     except ValueError as error:
         raise DamagedCheckpoint(f"{path}: {error}") from None

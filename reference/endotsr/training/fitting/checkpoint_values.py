@@ -53,29 +53,27 @@ def check_shapes(gaussians: Gaussians, adam: AdamState, frames: FrameParameters 
     for name, array in named.items():
         _check_axes(name, array, lengths)
         if array.dtype != gaussians.position.dtype or array.dtype.name not in PRECISIONS:
-            raise ValueError(f"{name}: {array.dtype}; allowed: {' or '.join(PRECISIONS)}, the same in every array")
+            raise ValueError(f"{name}: {array.dtype}; use {' or '.join(PRECISIONS)}, the same in every array")
     for together in TOGETHER:
         if 0 < len(named.keys() & set(together)) < len(together):
-            raise ValueError(f"{', '.join(together)}: some are missing; allowed: all {len(together)} or none")
+            raise ValueError(f"{', '.join(together)}: some are missing; use all {len(together)} or none")
     if lengths["K"] not in HARMONICS or lengths.get("2F", 0) % 2:
-        raise ValueError(
-            f"harmonics: {lengths['K']} coefficients, 2F = {lengths.get('2F')}; allowed: 1, 4, 9, 16; even"
-        )
+        raise ValueError(f"harmonics: {lengths['K']} coefficients, 2F = {lengths.get('2F')}; use 1, 4, 9, 16; even")
     if frames is not None and (frames.times.ndim != 1 or frames.times.dtype != np.float64):
-        raise ValueError(f"times: {frames.times.dtype} {frames.times.shape}; allowed: float64 (n,)")
+        raise ValueError(f"times: {frames.times.dtype} {frames.times.shape}; use float64 (n,)")
     check_lengths(gaussians, adam, frames)
     if adam.first.keys() != named.keys():
-        raise ValueError(f"first: moments of {', '.join(adam.first)}; allowed: those of {', '.join(named)}")
+        raise ValueError(f"first: moments of {', '.join(adam.first)}; use those of {', '.join(named)}")
 
 
 def _check_axes(name: str, array: NDArray, lengths: dict[str, int]) -> None:
     """Compare the axes with `SHAPES`; `lengths` records the length of each letter."""
     expected = SHAPES[name]
     if array.ndim != len(expected) + 1:
-        raise ValueError(f"{name}: {array.ndim} axes; allowed: {len(expected) + 1}")
+        raise ValueError(f"{name}: {array.ndim} axes; use {len(expected) + 1}")
     for length, wanted in zip(array.shape, expected):
         if length != (lengths.setdefault(wanted, length) if isinstance(wanted, str) else wanted):
-            raise ValueError(f"{name}: {array.shape}; allowed: ({', '.join(map(str, expected))}, count)")
+            raise ValueError(f"{name}: {array.shape}; use ({', '.join(map(str, expected))}, count)")
 
 
 def check_lengths(gaussians: Gaussians, adam: AdamState, frames: FrameParameters | None = None) -> None:
@@ -90,7 +88,7 @@ def check_lengths(gaussians: Gaussians, adam: AdamState, frames: FrameParameters
                 if found is not None and found.shape != (*array.shape[:-1], count):
                     raise ValueError(f"{label}: {found.shape} for {count} {what}")
                 if found is not None and found.dtype != array.dtype:
-                    raise ValueError(f"{label}: {found.dtype}; allowed: {array.dtype}")
+                    raise ValueError(f"{label}: {found.dtype}; use {array.dtype}")
 
 
 def check_numbers(
@@ -106,9 +104,9 @@ def check_numbers(
         if not good.all():
             index = tuple(int(i) for i in np.argwhere(~good)[0])
             limits = "finite numbers" if high > 1e30 and low else f"finite numbers from {low:g} to {high:.4g}"
-            raise ValueError(f"{label}[{', '.join(map(str, index))}] is {array[index]}; allowed: {limits}")
+            raise ValueError(f"{label}[{', '.join(map(str, index))}] is {array[index]}; use {limits}")
     if frames is not None and (np.diff(frames.times) <= 0).any():
-        raise ValueError("times: they do not ascend; allowed: the ascending times of the training frames")
+        raise ValueError("times: they do not ascend; use the ascending times of the training frames")
 
 
 def _limits(

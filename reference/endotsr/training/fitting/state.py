@@ -125,7 +125,7 @@ def new_training(sequence: Sequence, config: Config) -> TrainingState:
     if config.model.pose_correction and sequence.static_camera:
         raise InputError(
             "model.pose_correction = true: the camera of this sequence does not move, so a correction would absorb"
-            " tissue motion; allowed: a sequence with a pose for each frame"
+            " tissue motion; use a sequence with a pose for each frame"
         )
     rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)
     gaussians = initialise(sequence, config.initialisation, config.model, rng, dtype)

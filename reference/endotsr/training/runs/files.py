@@ -86,7 +86,7 @@ def refuse_nested(source: Path, out: Path, written: tuple[str, ...], other: str 
 def refuse_link(path: Path) -> None:
     """Raises InputError if `path` is a link, or exists and is no regular file: writing could change another file."""
     if path.is_symlink() or (path.exists() and not path.is_file()):
-        raise InputError(f"{path}: is a link or no regular file; allowed: the file that the run wrote")
+        raise InputError(f"{path}: is a link or no regular file; use the file that the run wrote")
 
 
 def refuse_unwritable(*files: Path | None) -> None:
@@ -94,9 +94,9 @@ def refuse_unwritable(*files: Path | None) -> None:
     for file in filter(None, files):
         above = file.parent
         if file.is_dir():
-            raise InputError(f"{file}: cannot be written: it is a folder; allowed: the name of a file")
+            raise InputError(f"{file}: cannot be written: it is a folder; use the name of a file")
         if not above.is_dir():
-            raise InputError(f"{file}: cannot be written: {above} is not a folder; allowed: a file in one that exists")
+            raise InputError(f"{file}: cannot be written: {above} is not a folder; use a file in one that exists")
         # A file is written beside its place and renamed, so its folder has to be writable too.
         if not all(os.access(path, os.W_OK) for path in (above, file) if path.exists()):
             raise InputError(f"{file}: cannot be written: no permission")
@@ -118,7 +118,7 @@ def refuse_no_text(file: Path) -> None:
     if file.is_file():
         with file.open("rb") as stream:
             if b"\0" in stream.read(HEAD):
-                raise InputError(f"{file}: would be replaced, but is no text file; allowed: another name")
+                raise InputError(f"{file}: would be replaced, but is no text file; use another name")
 
 
 def refuse_texts(files: dict[str, Path | None]) -> None:
@@ -130,16 +130,16 @@ def refuse_texts(files: dict[str, Path | None]) -> None:
             refuse_no_text(file)
             _refuse_other_kind(option, file)
             if options.setdefault(file.resolve(), option) != option:
-                raise InputError(
-                    f"{option} {file}: is also the file of {options[file.resolve()]}; allowed: another name"
-                )
+                raise InputError(f"{option} {file}: is also the file of {options[file.resolve()]}; use another name")
 
 
 def _refuse_other_kind(option: str, file: Path) -> None:
     """Raises InputError for the ending of another kind of file; one that names no kind, such as `.txt`, is allowed."""
     own, ending = ENDINGS.get(option, ()), file.suffix.lower()
     if own and ending in KNOWN_ENDINGS and ending not in own:
-        raise InputError(f"{option} {file}: {ending} is the ending of another kind of file; allowed: {', '.join(own)}")
+        raise InputError(
+            f"{option} {file}: {ending} is the ending of another kind of file; use one of {', '.join(own)}"
+        )
 
 
 def _refuse_input(file: Path) -> None:
@@ -149,13 +149,13 @@ def _refuse_input(file: Path) -> None:
         if file.is_file() and file.name in names and (file.parent / mark).is_file():
             raise InputError(f"{file}: would be replaced, but belongs to the folder of {mark}; use another name")
     if file.is_file() and (file.name == "sequence.toml" or (of_a_run and file.name in OF_A_RUN)):
-        raise InputError(f"{file}: would be replaced, but other commands read it; allowed: another name")
+        raise InputError(f"{file}: would be replaced, but other commands read it; use another name")
 
 
 def refuse_read_only(folder: Path) -> None:
     """Raises InputError if no file can be written in an existing folder."""
     if folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"{folder}: cannot be written: no permission; allowed: a folder that can be, such as a copy")
+        raise InputError(f"{folder}: cannot be written: no permission; use a folder that can be, such as a copy")
 
 
 def refuse_linked(folder: Path) -> None:

@@ -95,14 +95,14 @@ def _checkpoint_of(folder: RunFolder, config: Config) -> tuple["Checkpoint", boo
     if trained_on is not None and recorded is not None and trained_on != recorded:
         raise InputError(
             f"{folder.checkpoint}: trained on another sequence than the one in {folder.path / 'run.json'}; "
-            "allowed: unchanged checkpoint and records of one run"
+            "use unchanged checkpoint and records of one run"
         )
     asked = by_key(msgspec.json.decode(msgspec.json.encode(config)))  # as JSON, like the checkpoint's header
     for key, value in (*by_key(checkpoint.header.get("config")).items(), *_seen_in_arrays(checkpoint, config)):
         if key in asked and key not in CHANGE_NO_NUMBER and asked[key] != value:
             raise InputError(
                 f"{folder.checkpoint}: trained with {key} = {value!r}, but {folder.path / 'config.toml'} has "
-                f"{asked[key]!r}; allowed: unchanged checkpoint and settings of one run"
+                f"{asked[key]!r}; use unchanged checkpoint and settings of one run"
             )
     return checkpoint, bool(note)
 

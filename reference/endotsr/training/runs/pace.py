@@ -57,7 +57,7 @@ def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float, t
     if seconds(low) > 60 * minutes:
         raise InputError(
             f"{minutes:g} minutes are not allowed: the shortest training of this clip takes {seconds(low) / 60:.2g} on"
-            " this machine; allowed: more minutes, or a smaller scale of the frames"
+            " this machine; use more minutes, or a smaller scale of the frames"
         )
     for _ in range(HALVINGS):
         middle = (low + high) / 2

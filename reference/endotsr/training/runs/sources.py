@@ -31,7 +31,7 @@ def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> 
     if source == SIMULATED:
         return _simulated(simulated_settings(simulator, config), config)
     if source == IN_MEMORY:
-        raise InputError("the run was trained on arrays in memory; allowed: a folder with the same frames")
+        raise InputError("the run was trained on arrays in memory; use a folder with the same frames")
     from endotsr.clips.sequences.read import read_sequence
 
     return read_sequence(Path(source), config.sequence, config.raster.near)
@@ -53,7 +53,7 @@ def simulated_settings(simulator: SimulatorSettings, config: Config) -> Simulato
     wanted = config.sequence
     if wanted.frames:
         raise InputError(
-            "simulated: --frames selects files of a folder; allowed: a folder of `endotsr simulate SCENE --frames N`"
+            "simulated: --frames selects files of a folder; use a folder of `endotsr simulate SCENE --frames N`"
         )
     changes = {
         "width": round(simulator.width * wanted.scale),
@@ -135,7 +135,7 @@ def check_same_input(run: RunFolder, sequence: Sequence, source: str) -> None:
         if remembered.get(name) != found[name]:
             raise InputError(
                 f"{source}: {name} differ from those the run {run.path} was trained on (sha256 in run.json); "
-                "allowed: the clip as it was then, or a new training"
+                "use the clip as it was then, or a new training"
             )
 
 

@@ -231,8 +231,8 @@ def test_a_clip_that_fits_nowhere_is_refused_before_reading(sequence, tmp_path, 
     assert found["frames-in-file"].level == "note" and "disk" not in found
     monkeypatch.setattr("shutil.disk_usage", lambda place: SimpleNamespace(free=10))
     found = {f.code: f for f in check_sequence(tmp_path / "clip", few).findings}
-    assert found["disk"].level == "refusal" and "allowed: fewer --frames" in found["disk"].what
-    with pytest.raises(InputError, match="allowed: fewer --frames"):
+    assert found["disk"].level == "refusal" and "use fewer --frames" in found["disk"].what
+    with pytest.raises(InputError, match="use fewer --frames"):
         read_sequence(tmp_path / "clip", few.sequence, 0.2)
 
 

@@ -208,7 +208,7 @@ EXPORTED_ROWS = [
     Row("masks, TIFF of 0 and 1 as numbers with a point", masked([mask()] * 12, change=saved(numbers(1.0), ".tif")),
         "right", "", half_excluded),
     Row("masks, TIFF of 0 and 0.5", masked([mask()] * 12, change=saved(numbers(0.5), ".tif")), "refused",
-        "holds 0.5; allowed: whole numbers"),
+        "holds 0.5; use whole numbers"),
     Row("camera of half the size", with_camera("50", "50", "32", "24"), "told", "of 0.5 times this size"),
     Row("camera of two thirds of the size", with_camera("67", "67", "42.7", "32"), "told", "of 0.667 times this size"),
     Row("calibration, matrix K of half the size", calibrated("K.txt", HALF), "told", "of 0.5 times this size"),
@@ -265,7 +265,7 @@ EXPORTED_ROWS = [
     Row("COLMAP, pictures of half the size", colmap(change=half_pictures), "refused", "the intrinsics are of 64x48"),
     Row("COLMAP, points3D without a point", colmap(change=lambda folder: (folder / "sparse/0/points3D.txt").write_text(
         "# none")), "told", "no frame has depth"),
-    Row("trajectory, a lost frame as nan", trajectory(LOST), "refused", "line 5: allowed: 8 finite numbers"),
+    Row("trajectory, a lost frame as nan", trajectory(LOST), "refused", "line 5: use 8 finite numbers"),
     Row("calibration of Metashape", calibrated("a.xml", METASHAPE), "refused", "the root is calibration"),
     Row("calibration, parts of the picture in JSON", calibrated("a.json", NORMALISED), "told", "field-of-view"),
 ]  # fmt: skip

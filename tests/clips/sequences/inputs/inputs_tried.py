@@ -318,7 +318,7 @@ ROWS = [
         container={"movflags": "faststart"}, change=cut(0.7)), "refused", "truncated or damaged"),
     Row("video, damaged H.264", video("a.mp4", pictures(40), options={"qp": "4"}, change=scratched), "refused",
         "picture"),
-    Row("video, size changes", joined, "refused", "allowed: one size"),
+    Row("video, size changes", joined, "refused", "use one size"),
     Row("video, stereo, side by side", video("a.mp4", STEREO, "--stereo", "side_by_side", "--baseline", "4"), "right",
         "", both(sides(pictures(), pictures()), baseline(4))),
     Row("video, stereo, of odd width", video("a.mkv", [p[:, :127] for p in pictures()], "--stereo", "side_by_side",
@@ -397,7 +397,7 @@ ROWS = [
         "points of the prior depth", centred),
     Row("calibration, ROS", calibrated("a.yaml", ros_text()), "told", "half a pixel was added", centred),
     Row("calibration, ROS, fisheye", calibrated("a.yaml", ros_text(distortion_model="equidistant")), "refused",
-        "allowed: plumb_bob"),
+        "use one of plumb_bob"),
     Row("calibration, Kalibr", calibrated("a.yaml", kalibr_text()), "told", "half a pixel was added", centred),
     Row("calibration, Kalibr, of another size", calibrated("a.yaml", kalibr_text(resolution=[128, 128])),
         "refused", "the calibration is of 128x128"),
@@ -426,7 +426,7 @@ ROWS = [
     Row("common format, times that go back", common(times=[0.0, 0.1, 0.3, 0.2, 0.4]), "refused", "ascending seconds"),
     Row("common format, uneven times", common(times=[0.0, 0.1, 0.2, 0.9, 1.0]), "told", "uneven-times"),
     Row("masks of a round field of view", scope, "told", "field of view: ", view_is_kept),
-    *(Row(f"export to {name}", exported(name, *words), "refused", "allowed: FILE.ply")
+    *(Row(f"export to {name}", exported(name, *words), "refused", "use FILE.ply")
       for name, *words in (("a.spz",), ("a.splat",), ("a.obj", "--content", "mesh"), ("a.gltf", "--content", "mesh"))),
     *ODD_ROWS,
     *CARELESS_ROWS,

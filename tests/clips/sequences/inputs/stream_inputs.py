@@ -89,7 +89,7 @@ STREAM_ROWS = [
         "camera-calibration: the calibration of the keyframe is used", true_at(0, 1, 2, 3)),
     Row("SCARED, as downloaded", unpacked(as_downloaded), "told", "left_depth_map.tiff: structured light",
         true_at(0, 1, 2, 3)),
-    Row("SERV-CT, P1 and P2 differ", public("servct", change=other_cameras), "refused", "allowed: one camera"),
+    Row("SERV-CT, P1 and P2 differ", public("servct", change=other_cameras), "refused", "use one camera"),
     Row("Hamlyn, two folders of left pictures", public("hamlyn", "--baseline", "5", change=two_left), "told",
         "not read: image01/", centred),
     Row("pictures, bmp with oblong pixels", folder_of(pictures(4), change=oblong), "told", "the pixels are not square",

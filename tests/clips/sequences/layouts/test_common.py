@@ -134,7 +134,7 @@ def test_a_scale_factor_of_pfm_is_refused(tmp_path, factor, accepted):
     if accepted:
         np.testing.assert_array_equal(read_plane(tmp_path / "a.pfm"), [[3, 4, 5], [0, 1, 2]])
         return
-    with pytest.raises(InputError, match=r"a\.pfm: .*scale factor .*; allowed: 1 or -1"):
+    with pytest.raises(InputError, match=r"a\.pfm: .*scale factor .*; use 1 or -1"):
         read_plane(tmp_path / "a.pfm")
 
 
@@ -201,17 +201,17 @@ def text(path, old, new, count=1):
 WRONG = {
     "format": (lambda p: text(p, "sequence-1", "sequence-9"), "format = 'endotsr-sequence-9'.*allowed"),
     "not TOML": (lambda p: (p / FILE_NAME).write_text("format = "), "not valid TOML"),
-    "unknown key": (lambda p: text(p, "fx =", "focal ="), "unknown key camera.focal; allowed"),
+    "unknown key": (lambda p: text(p, "fx =", "focal ="), "unknown key camera.focal; use one of"),
     "missing key": (lambda p: text(p, "fx = 30.0\n", ""), "camera.fx is missing"),
     "no camera": (lambda p: (p / FILE_NAME).write_text('format = "endotsr-sequence-1"\nframes = 5'), "camera is miss"),
-    "focal length 0": (lambda p: text(p, "fx = 30.0", "fx = 0.0"), "camera.fx = 0.0 is not allowed; allowed: a numb"),
+    "focal length 0": (lambda p: text(p, "fx = 30.0", "fx = 0.0"), "camera.fx = 0.0 is not allowed; use a numb"),
     "focal length text": (lambda p: text(p, "fx = 30.0", 'fx = "a"'), "camera.fx = 'a' is not allowed"),
     "nan": (lambda p: text(p, "cx = 15.0", "cx = nan"), "camera.cx = nan is not allowed"),
     "principal point": (lambda p: text(p, "cx = 15.0", "cx = 960.0"), "principal point.*another picture size"),
     "distortion": (lambda p: text(p, "distortion = []", "distortion = [0.1, 0, 0, 0]"), "endotsr prepare"),
     "three coefficients": (lambda p: text(p, "distortion = []", "distortion = [0.1, 0, 0]"), "none, 4, 5 or 8"),
     "distortion text": (lambda p: text(p, "distortion = []", 'distortion = ["a"]'), "camera: a list of numbers"),
-    "unit": (lambda p: text(p, 'unit = "mm"', 'unit = "inch"'), "unit = 'inch' is not allowed; allowed: um, mm"),
+    "unit": (lambda p: text(p, 'unit = "mm"', 'unit = "inch"'), "unit = 'inch' is not allowed; use one of um, mm"),
     "one unit arbitrary": (lambda p: text(p, 'unit = "mm"', 'unit = "arbitrary"'), "depth.unit = 'mm' with unit"),
     "frames": (lambda p: text(p, "frames = 5", "frames = 6"), "frames = 6, but images/ holds 5"),
     "depth missing": (lambda p: (p / "depth/000002.png").unlink(), "depth: has no file for frame 2"),
@@ -221,7 +221,7 @@ WRONG = {
     "folder outside": (lambda p: text(p, 'folder = "depth"', 'folder = "../depth"'), "depth.folder = '../depth'"),
     "scale 0": (lambda p: text(p, "scale = 0.01", "scale = 0.0"), "depth.scale = 0.0 is not allowed"),
     "a pose too few": (lambda p: text(p, "    [1.0", "#"), "4 rows for 5 frames"),
-    "a row too short": (lambda p: text(p, "    [1.0, 0.0,", "    [1.0,"), "frame 0: 11 numbers; allowed: 12"),
+    "a row too short": (lambda p: text(p, "    [1.0, 0.0,", "    [1.0,"), "frame 0: 11 numbers; use 12"),
     "no rotation": (lambda p: text(p, "    [1.0,", "    [2.0,"), "frame 0: the first three columns are not perp"),
     "mirror": (lambda p: text(p, "    [1.0,", "    [-1.0,"), "frame 0: .*mirror image"),
     "interpolated text": (lambda p: text(p, "interpolated = []", 'interpolated = "a"'), "interpolated = 'a' is not"),

@@ -213,9 +213,9 @@ def test_a_folder_with_both_videos_of_a_pair_takes_no_other_view(tmp_path):
     (tmp_path / "raw").mkdir()
     for name in ("raw/left", "raw/right", "other"):
         made.write(tmp_path / f"{name}.mkv", [made.picture(i) for i in range(3)])
-    with pytest.raises(InputError, match="raw: has a right video, and --right names another; allowed: one of them"):
+    with pytest.raises(InputError, match="raw: has a right video, and --right names another; use one of them"):
         describe(tmp_path / "raw", SourceOptions(right=tmp_path / "other.mkv", baseline=4.0))
-    with pytest.raises(InputError, match="two videos of a pair and --stereo side_by_side; allowed: one of them"):
+    with pytest.raises(InputError, match="two videos of a pair and --stereo side_by_side; use one of them"):
         describe(tmp_path / "raw", SourceOptions(stereo="side_by_side", baseline=4.0))
 
 

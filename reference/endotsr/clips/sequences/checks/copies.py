@@ -158,7 +158,7 @@ def without_twins(
     kept = train[~twins]
     if len(kept) < LEAST_TRAINING_FRAMES:
         raise InputError(
-            f"{where}: all but {len(kept)} training frames are copies of held-out frames; allowed: a clip without the"
+            f"{where}: all but {len(kept)} training frames are copies of held-out frames; use a clip without the"
             " copies (`endotsr check` names them), or another split"
         )
     left = [names[i] for i in train[twins].tolist()]

@@ -157,7 +157,7 @@ def row_finding(rows: list[RowMatches], where: str) -> list[Finding]:
         return []
     what = (
         f"points lie {np.median(apart):.1f} pixels (at most {apart.max():.1f}) above or below their row in the left"
-        f" view: {kept.sum()} matches in {len(rows)} frames; allowed: less than {APART:g}"
+        f" view: {kept.sum()} matches in {len(rows)} frames; the limit is {APART:g}"
     )
     return [finding("unrectified-views", where, what)]
 

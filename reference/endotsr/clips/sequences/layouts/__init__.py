@@ -66,7 +66,7 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
     if name != "auto":
         found = {layout.name: layout for layout in layouts()}
         if name not in found:
-            raise InputError(f"layout {name!r} is not allowed; allowed: auto, {', '.join(found)}")
+            raise InputError(f"layout {name!r} is not allowed; use one of auto, {', '.join(found)}")
         return found[name]
     if not path.exists():
         raise InputError(f"{path}: not found")
@@ -74,7 +74,7 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
         if layout.recognises(path):
             return layout
     known = "; ".join(f"{layout.name} ({layout.about})" for layout in layouts())
-    raise InputError(f"{path}: no known layout{what_it_is(path)}; allowed: {known}")
+    raise InputError(f"{path}: no known layout{what_it_is(path)}; use {known}")
 
 
 def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
@@ -103,8 +103,8 @@ def _refuse_unknown_unit(clip: Clip, options: SourceOptions) -> None:
     if wrong and not clip.arbitrary:
         allowed = ", ".join(MILLIMETRES)
         raise InputError(
-            f"{clip.where}: --{wrong}-unit arbitrary: the layout {clip.layout} has lengths in a known unit; allowed:"
-            f" {allowed}"
+            f"{clip.where}: --{wrong}-unit arbitrary: the layout {clip.layout} has lengths in a known unit; use"
+            f" one of {allowed}"
         )
 
 
@@ -132,7 +132,7 @@ def _of_one_unit(clip: Clip, options: SourceOptions) -> Clip:
         what, remedy = "positions", f" and --{name}; after endotsr depth, endotsr poses scales a path to its depth"
     raise InputError(
         f"{clip.where}: --{name}-unit arbitrary beside a baseline in millimetres: the {what} would have another scale"
-        f" than the pair; allowed: the unit of the {what}, or without --{name}-unit{remedy}"
+        f" than the pair; use the unit of the {what}, or without --{name}-unit{remedy}"
     )
 
 
@@ -154,8 +154,10 @@ def refuse_unused(layout: Layout, path: Path, options: SourceOptions) -> None:
     for name in STATEMENTS:
         if getattr(options, name) != getattr(NOTHING, name) and name not in layout.takes:
             given, *taken = (f"--{word.replace('_', '-')}" for word in (name, *layout.takes))
-            allowed = ", ".join(taken) or "none of these"
-            raise InputError(f"{path}: the layout {layout.name} does not read {given}; allowed: {allowed}")
+            read = ", ".join(taken) or "none"
+            raise InputError(
+                f"{path}: the layout {layout.name} does not read {given}; of these options it reads {read}"
+            )
 
 
 def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
@@ -169,7 +171,7 @@ def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
     found = next((layout for layout in layouts() if path.exists() and layout.recognises(path)), None)
     if found is None and path.is_dir() and not any((path / part).exists() for part in PARTS_OF_ENDONERF):
         raise InputError(
-            f"{path}: no sequence{what_it_is(path)}; allowed: a folder that `endotsr prepare SOURCE --out FOLDER`"
+            f"{path}: no sequence{what_it_is(path)}; use a folder that `endotsr prepare SOURCE --out FOLDER`"
             " wrote, or one with images/, depth/, masks/ and poses_bounds.npy"
         )
     if found is None or (found.name == "pictures" and (path / "depth").is_dir()):

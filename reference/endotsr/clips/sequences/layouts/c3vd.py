@@ -85,7 +85,7 @@ def read_poses(path: Path) -> list[CameraPose | None]:
         if stored.size == 0 and not line.strip():
             continue
         if stored.size != 16 or not np.isfinite(stored).all():
-            raise InputError(f"{path}: line {number}: allowed: 16 finite numbers")
+            raise InputError(f"{path}: line {number}: use 16 finite numbers")
         where = f"{path}: line {number}"
         turn, shift = rows_of_motion(stored.reshape(4, 4).T, where)
         found.append(inverse_pose(checked_rotation(turn, where), shift))
@@ -99,7 +99,7 @@ def describe_c3vd(path: Path, options: SourceOptions) -> Clip:
     poses, maps = read_poses(path / POSES), pinhole_maps()
     if len(poses) != len(files):
         raise InputError(
-            f"{path / POSES}: {len(poses)} poses for {counted(len(files), 'picture')}; allowed: one per picture"
+            f"{path / POSES}: {len(poses)} poses for {counted(len(files), 'picture')}; use one per picture"
         )
     paired = matching_files(files, planes) if planes else []
 
@@ -107,7 +107,7 @@ def describe_c3vd(path: Path, options: SourceOptions) -> Clip:
         for i in wanted:
             picture = colour_picture(read_picture(files[i]), files[i])
             if picture.shape[:2] != (HEIGHT, WIDTH):
-                raise InputError(f"{files[i]}: {picture.shape[1]}x{picture.shape[0]} pixels; allowed: {WIDTH}x{HEIGHT}")
+                raise InputError(f"{files[i]}: {picture.shape[1]}x{picture.shape[0]} pixels; use {WIDTH}x{HEIGHT}")
             yield PicturePair(remapped(picture, maps))
 
     def depth(i: int) -> NDArray[np.float32] | None:

@@ -34,7 +34,7 @@ def describe_colmap(path: Path, options: SourceOptions) -> Clip:
     folder, notes = choose_model(path, options.model)
     model = read_model(folder)
     if not model.images:
-        raise InputError(f"{folder}: the model holds no registered picture; allowed: a model with registered pictures")
+        raise InputError(f"{folder}: the model holds no registered picture; use a model with registered pictures")
     registered = _one_side(model.images, notes)
     files = files_of_model(path, folder, [image.name for image in registered])
     order = time_order(files)

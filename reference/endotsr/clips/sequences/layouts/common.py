@@ -97,7 +97,7 @@ def _masks(folder: FolderReader, found: SequenceFile, options: SourceOptions) ->
     settings = options.settings
     if settings is not None and settings.masks == "gt_masks":
         raise InputError(
-            f"{folder.path}: sequence.masks = 'gt_masks': {FILE_NAME} names the mask folder; allowed: masks, none"
+            f"{folder.path}: sequence.masks = 'gt_masks': {FILE_NAME} names the mask folder; use masks or none"
         )
     if found.masks is None or (settings is not None and settings.masks == "none"):
         return None, []

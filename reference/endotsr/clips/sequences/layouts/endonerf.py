@@ -81,7 +81,7 @@ def describe_endonerf(path: Path, options: SourceOptions) -> Clip:
 
 def _refuse_other_than_folder(path: Path, settings: SequenceConfig) -> None:
     if path.is_file():
-        raise InputError(f"{path}: is a file; allowed: a folder with images/, depth/, {settings.masks}/ and poses")
+        raise InputError(f"{path}: is a file; use a folder with images/, depth/, {settings.masks}/ and poses")
     if not path.is_dir():
         raise InputError(f"{path}: sequence folder not found")
 

@@ -107,7 +107,7 @@ def pairs(left: list[TimedFile], right: list[TimedFile], notes: list[str]) -> tu
     kept = [(row, k) for row, k in zip(left, nearest) if abs(int(stamps[k]) - row.stamp) <= PAIRED]
     if not kept:
         raise InputError(
-            f"{right[0].file.parent}: no picture within {PAIRED / 1e6:g} ms of one of {left[0].file.parent}; allowed:"
+            f"{right[0].file.parent}: no picture within {PAIRED / 1e6:g} ms of one of {left[0].file.parent}; use"
             " cameras that are triggered together, or a folder without cam1"
         )
     alone = {row.file.name for row in left} - {row.file.name for row, _ in kept}
@@ -171,7 +171,7 @@ def _poses(body: Path, options: SourceOptions, times: np.ndarray, notes: list[st
 def _some(poses: list[CameraPose | None], path: Path) -> list[CameraPose | None]:
     """The poses. Raises InputError if no picture has one."""
     if not any(poses):
-        raise InputError(f"{path}: no pose at the time of any picture; allowed: stamps of the clock of {LIST} of cam0")
+        raise InputError(f"{path}: no pose at the time of any picture; use stamps of the clock of {LIST} of cam0")
     return poses
 
 
@@ -179,7 +179,7 @@ def describe_euroc(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError."""
     body, notes = _body(path), []
     if not recognises(path):
-        raise InputError(f"{path}: allowed: a folder with {BODY}/{CAMERAS[0]}/{LIST}, or {BODY} itself")
+        raise InputError(f"{path}: use a folder with {BODY}/{CAMERAS[0]}/{LIST}, or {BODY} itself")
     left, right = listed_pictures(body / CAMERAS[0], notes), []
     if (body / CAMERAS[1] / LIST).is_file():
         left, right = pairs(left, listed_pictures(body / CAMERAS[1], notes), notes)

@@ -48,7 +48,7 @@ def describe_hamlyn(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError."""
     left_folder, right_folder, depth_folder = (_first(path, names) for names in (LEFT, RIGHT, DEPTH))
     if left_folder is None or not (path / CAMERA).is_file():
-        raise InputError(f"{path}: allowed: a folder with {CAMERA} and {' or '.join(LEFT)}")
+        raise InputError(f"{path}: use a folder with {CAMERA} and {' or '.join(LEFT)}")
     left = list_pictures(left_folder, PICTURE_ENDINGS)
     right = list_pictures(right_folder, PICTURE_ENDINGS) if right_folder else []
     if right:

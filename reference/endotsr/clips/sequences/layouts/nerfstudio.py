@@ -194,8 +194,7 @@ def _times(entries: list[Keys], rate: float | None, file: Path, notes: list[str]
     if not all("time" in entry for entry in entries):
         if any("time" in entry for entry in entries):
             raise InputError(
-                f"{file}: time: {sum('time' in e for e in entries)} of {len(entries)} frames have one;"
-                " allowed: all or none"
+                f"{file}: time: {sum('time' in e for e in entries)} of {len(entries)} frames have one; use all or none"
             )
         return None
     times = np.array([number(entry["time"], f"{file}: frame {i}: time") for i, entry in enumerate(entries)])
@@ -255,7 +254,7 @@ def _picture(folder: Path, name: Any, where: str) -> Path:
     """The file of a picture, whose ending may be missing. Raises InputError without a name."""
     path = _named(folder, name, where)
     if path is None:
-        raise InputError(f"{where}: a frame has none; allowed: the name of a picture in every entry")
+        raise InputError(f"{where}: a frame has none; use the name of a picture in every entry")
     if path.suffix.lower() in PICTURE_ENDINGS:
         return path
     found = [path.with_name(path.name + ending) for ending in PICTURE_ENDINGS]

@@ -131,12 +131,12 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
     left, right = find_pictures(path)
     if options.right is not None:
         if right:
-            raise InputError(f"{path}: has right pictures, and --right names others; allowed: one of them")
+            raise InputError(f"{path}: has right pictures, and --right names others; use one of them")
         right = files_of(options.right, PICTURE_ENDINGS)
         check_pairing(left, right)
     stereo = "none" if options.stereo == "auto" else options.stereo
     if right and stereo != "none":
-        raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
+        raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: use one of them")
     width, height = view_size(*size_of(left), stereo)
     camera = stated_camera(options, width, height, path)
     gaps = [found.line for found in gap_findings(left)] + _in_turn(left) + squeezed_note(width, height, stereo)

@@ -36,19 +36,18 @@ def read_cameras(path: Path, frames: list[Path]) -> dict[str, np.ndarray]:
     found = read_npz(path, KEYS, LARGEST_FILE)
     missing = [key for key in KEYS if key not in found]
     if missing:
-        raise InputError(f"{path}: {', '.join(missing)} missing; allowed: an npz with {', '.join(KEYS)}")
+        raise InputError(f"{path}: {', '.join(missing)} missing; use an npz with {', '.join(KEYS)}")
     n, m = len(frames), len(found["points"]) if found["points"].ndim else 0
     shapes = {"w2c": (n, 4, 4), "K": (3, 3), "points": (m, 3), "visible": (m, n), "frame_ids": (n,)}
     for key, shape in shapes.items():
         if found[key].shape != shape:
             raise InputError(f"{path}: {key} has shape {found[key].shape}; expected {shape} for {n} pictures")
         if found[key].dtype.kind not in "fiub" or not np.isfinite(found[key]).all():
-            raise InputError(f"{path}: {key} holds values that are not finite numbers; allowed: finite ones")
+            raise InputError(f"{path}: {key} holds values that are not finite numbers; use finite ones")
     numbers = frame_numbers(frames)
     if numbers is None or [number[-1] for number in numbers] != found["frame_ids"].tolist():
         raise InputError(
-            f"{path}: frame_ids are not the numbers in the names of images/;"
-            " allowed: one for each picture, in their order"
+            f"{path}: frame_ids are not the numbers in the names of images/; use one for each picture, in their order"
         )
     return found
 

@@ -68,7 +68,7 @@ def describe_scared(path: Path, options: SourceOptions) -> Clip:
     """The keyframe as a clip. Raises InputError."""
     calibration = options.calibration or _calibration(path)
     if calibration is None or not (path / VIDEO).is_file():
-        raise InputError(f"{path}: allowed: a folder with {VIDEO} and {CALIBRATIONS[0]}")
+        raise InputError(f"{path}: use a folder with {VIDEO} and {CALIBRATIONS[0]}")
     stated = replace(options, stereo="stacked", calibration=calibration)
     clip = describe_video(path / VIDEO, stated)
     inside = sorted(entry.name for folder in (path, path / "data") for entry in folder.iterdir())
@@ -143,15 +143,15 @@ def _refuse_member(archive: Path, member: tarfile.TarInfo, twice: bool) -> None:
     """Raises InputError for a file that is too large for one frame, or whose name another folder there has too."""
     if member.size > LARGEST_FILE:
         most = f"{LARGEST_FILE >> 20} MiB"
-        raise InputError(f"{archive}: {plain_line(member.name)} is larger than {most}; allowed: JSON of one frame")
+        raise InputError(f"{archive}: {plain_line(member.name)} is larger than {most}; use JSON of one frame")
     if twice:
-        raise InputError(f"{archive}: {plain_line(member.name)}: two files have this name; allowed: one per frame")
+        raise InputError(f"{archive}: {plain_line(member.name)}: two files have this name; use one per frame")
 
 
 def _refuse_many(where: Path, count: int) -> None:
     """Raises InputError for more files than a recording can have frames."""
     if count > MOST_FILES:
-        raise InputError(f"{where}: more than {MOST_FILES} files; allowed: one JSON per frame")
+        raise InputError(f"{where}: more than {MOST_FILES} files; use one JSON per frame")
 
 
 def _unpacked(file: Path) -> bytes:
@@ -159,7 +159,7 @@ def _unpacked(file: Path) -> bytes:
     with open_regular(file, LARGEST_ARCHIVE) as packed, gzip.GzipFile(fileobj=packed) as stream:
         content = stream.read(LARGEST_ARCHIVE + 1)
     if len(content) > LARGEST_ARCHIVE:
-        raise InputError(f"{file}: unpacks to more than {LARGEST_ARCHIVE >> 20} MiB; allowed: at most that")
+        raise InputError(f"{file}: unpacks to more than {LARGEST_ARCHIVE >> 20} MiB; use at most that")
     return content
 
 

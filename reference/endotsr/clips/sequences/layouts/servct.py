@@ -64,9 +64,11 @@ def read_camera(path: Path, width: int, height: int, notes: list[str]) -> tuple[
     notes += CAMERA.noted(found, path.name)
     left, right = (matrix(found.get(name), f"{path}: {name}", (3, 4)) for name in ("P1", "P2"))
     if right[0, 3] >= 0:
-        raise InputError(f"{path}: P2: the fourth number is {right[0, 3]:g}; allowed: below 0, -f times the baseline")
+        raise InputError(
+            f"{path}: P2: the fourth number is {right[0, 3]:g}; use a number below 0, -f times the baseline"
+        )
     if left[:, 3].any() or np.abs(right[:, :3] - left[:, :3]).max() > SAME:
-        raise InputError(f"{path}: P1 and P2: allowed: one camera, with 0 in the fourth column of P1")
+        raise InputError(f"{path}: P1 and P2: use one camera, with 0 in the fourth column of P1")
     return intrinsics_of_matrix(left[:, :3], width, height, where=path), float(-right[0, 3] / right[0, 0])
 
 
@@ -81,7 +83,7 @@ def describe_servct(path: Path, options: SourceOptions) -> Clip:
     numbers = np.array([[*intrinsics[:4], baseline] for intrinsics, baseline in cameras])
     apart = np.flatnonzero(np.abs(numbers - numbers[0]).max(axis=1) > 1e-3)
     if apart.size:
-        raise InputError(f"{files[apart[0]]}: another camera than {files[0].name}; allowed: one for all frames")
+        raise InputError(f"{files[apart[0]]}: another camera than {files[0].name}; use one for all frames")
     depth = list_pictures(path / DEPTH, DEPTH_ENDINGS) if (path / DEPTH).is_dir() else []
     planes = matching_files(left, depth) if depth else []
     clip = Clip(

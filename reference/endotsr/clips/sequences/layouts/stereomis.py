@@ -39,7 +39,7 @@ def describe_stereomis(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError for more than one video, and for invalid files."""
     videos = _videos(path)
     if len(videos) != 1:
-        raise InputError(f"{path}: {len(videos)} videos ({', '.join(v.name for v in videos)}); allowed: one")
+        raise InputError(f"{path}: {len(videos)} videos ({', '.join(v.name for v in videos)}); use one")
     trajectory = path / TRAJECTORY
     stated = replace(
         options,

@@ -71,11 +71,11 @@ def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
         except ValueError:
             time = float("nan")
         if len(words) != 2 or not np.isfinite(time):
-            raise InputError(f"{path}: line {place}: allowed: a time in seconds and the name of a file")
+            raise InputError(f"{path}: line {place}: use a time in seconds and the name of a file")
         times.append(time)
         files.append(path.parent / relative_path(words[1].strip(), f"{path}: line {place}"))
     if not times:
-        raise InputError(f"{path}: names no picture; allowed: lines of a time in seconds and the name of a file")
+        raise InputError(f"{path}: names no picture; use lines of a time in seconds and the name of a file")
     order = np.argsort(times, kind="stable")
     stamps = np.array(times)[order]
     step = next(step for least, step, _ in TICKS if stamps[0] >= least)

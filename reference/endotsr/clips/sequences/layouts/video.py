@@ -80,10 +80,10 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
 def _left_and_right(path: Path, sides: tuple[Path, Path] | None, options: SourceOptions) -> tuple[Path, Path | None]:
     """The video and that of the right view, if there is one. Raises InputError if the options state both otherwise."""
     if sides and options.right is not None:
-        raise InputError(f"{path}: has a right video, and --right names another; allowed: one of them")
+        raise InputError(f"{path}: has a right video, and --right names another; use one of them")
     path, right = sides or (path, options.right)
     if right is not None and options.stereo not in ("auto", "none"):
-        raise InputError(f"{path}: two videos of a pair and --stereo {options.stereo}; allowed: one of them")
+        raise InputError(f"{path}: two videos of a pair and --stereo {options.stereo}; use one of them")
     return path, right
 
 
@@ -111,7 +111,7 @@ def _check_right(left: VideoFacts, right: VideoFacts, path: Path, other: Path) -
     for name, here, there in compared:
         if here != there:
             said = f"{name} {there:g}, of {path.name} {here:g}"
-            raise InputError(f"{other}: {said}; allowed: the right view of each picture")
+            raise InputError(f"{other}: {said}; use the right view of each picture")
 
 
 def _clock(facts: VideoFacts, options: SourceOptions, path: Path) -> tuple[float | None, NDArray[np.float64] | None]:
@@ -120,7 +120,7 @@ def _clock(facts: VideoFacts, options: SourceOptions, path: Path) -> tuple[float
         return options.rate, None
     if not facts.clock.stands:
         raise InputError(
-            f"{path}: {facts.clock.remark}, and the jump is longer than all pictures together; allowed: --source-rate"
+            f"{path}: {facts.clock.remark}, and the jump is longer than all pictures together; use --source-rate"
             " HZ (evenly spaced), or a file cut there"
         )
     return facts.clock.rate, facts.clock.times
@@ -142,13 +142,13 @@ def _quarter_turns(facts: VideoFacts, options: SourceOptions, path: Path) -> int
     """Counter-clockwise quarter turns to apply. Raises InputError for a stated rotation without --orientation."""
     if facts.views.mirrored and options.orientation != "stored":
         raise InputError(
-            f"{path}: the file states that its pictures are shown mirrored; allowed: --orientation stored (as the"
+            f"{path}: the file states that its pictures are shown mirrored; use --orientation stored (as the"
             " sensor wrote them), or a file that stores them as they are to be read"
         )
     if facts.turn and options.orientation is None:
         raise InputError(
             f"{path}: the file states that its pictures are shown rotated by {facts.turn} degrees counter-clockwise;"
-            " intrinsics, masks and depth fit only one of the two: allowed: --orientation turned (as players and ffmpeg"
+            " intrinsics, masks and depth fit only one of the two: use --orientation turned (as players and ffmpeg"
             " show them) or --orientation stored (as the sensor wrote them)"
         )
     return facts.turn // 90 if options.orientation == "turned" else 0
