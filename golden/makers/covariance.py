@@ -1,8 +1,8 @@
 """Family `covariance`: rotation and semi-axes of a Gaussian (B2) from its raw quaternion and log-scale.
 
 Inputs: quaternions of any length, log-scales, and gradients with respect to rotation and scale. The cases test the
-order w, x, y, z, the normalisation and its gradient, the zero quaternion (the identity, gradient 0) and the clip of a
-log-scale at +-40.
+order w, x, y, z, the normalisation and its gradient, short quaternions, the zero one (the identity, gradient 0) and the
+clip of a log-scale at +-40.
 """
 
 from makers.making import Made, Seeds, Spec, changed, given
@@ -32,9 +32,13 @@ def _generic(seeds: Seeds, count: int) -> dict[str, Made]:
 
 
 def cases() -> list[Spec]:
-    """Raw quaternions, a zero one, clipped log-scales."""
+    """Raw quaternions, short ones, a zero one, clipped log-scales."""
     generic = _generic(Seeds("covariance", "generic"), 6)
     zero = generic | {"quaternion": changed(generic["quaternion"], (slice(None), 2), 0.0, "quaternion 2 is 0")}
+    short = _generic(Seeds("covariance", "short_quaternion"), 4)
+    lengths = [2.0**-14, 2.0**-30, 2.0**-60, 2.0**20]
+    short["quaternion"] = given([[length * entry for length in lengths] for entry in (1.0, -2.0, 1.0, 2.0)],
+                                "(1, -2, 1, 2) times 2^-14, 2^-30, 2^-60 and 2^20")  # fmt: skip
     clipped = _generic(Seeds("covariance", "clipped_log_scale"), 5)
     clipped["log_scale"] = given([[60.0, 1.0, -60.0, 41.0, 40.0], [2.0, -41.0, 1.0, 39.0, 1.0],
                                   [0.5, 3.0, -2.0, -39.0, -40.0]],
@@ -46,6 +50,8 @@ def cases() -> list[Spec]:
         Spec("covariance", "generic", "covariance", "Raw quaternions w, x, y, z of any length", flags, {}, generic),
         Spec("covariance", "zero_quaternion", "covariance", "A zero quaternion is the identity, gradient 0",
              ("zero_quaternion",), {}, zero, ("quaternion",), own=("rotation",)),
+        Spec("covariance", "short_quaternion", "covariance", "A quaternion has a direction at any length above 0",
+             ("short_quaternion_as_zero", "epsilon_added_to_norm"), {}, short, ("quaternion",)),
         Spec("covariance", "clipped_log_scale", "covariance", "A log-scale is clipped to +-40, gradient 0",
              ("log_scale_not_clipped", "log_scale_gradient_through_clip", "log_scale_gradient_zero_on_limit"), {},
              clipped,
