@@ -84,7 +84,7 @@ def test_the_rest_of_the_way_takes_one_command_each(chain, capsys):
     [
         (["--stereo.on", "false"], ("stereo.on = False does not fit the layout stereomis",)),
         (["--width", "97"], ("width = 97 does not fit a video", "even")),
-        (["--layout", "colmap"], ("layout", "endonerf, stereomis")),
+        (["--layout", "colmap"], ("layout", "endonerf or stereomis")),
         (["--layout", "endonerf", "--lossless"], ("--lossless needs --layout stereomis",)),
     ],
 )
