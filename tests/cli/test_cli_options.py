@@ -138,6 +138,11 @@ def test_unusable_setting_is_one_line(words, named, tmp_path, capsys):
         (["--excluded-value", "black"], "--excluded-value: no such option; did you mean --sequence.excluded-value?"),
         (["--resum"], "--resum: no such option; did you mean --resume?"),
         (["--frobnicate"], "--frobnicate: no such option; `endotsr train --help` lists the options"),
+        (
+            ["\N{EM DASH}scale", "0.5"],
+            "\N{EM DASH}scale: begins with a dash in place of two hyphens; did you mean --scale?",
+        ),
+        (["\N{EN DASH}seed=2"], "\N{EN DASH}seed=2: begins with a dash in place of two hyphens; did you mean --seed?"),
         (["again"], "'again': unexpected argument; `endotsr train --help` lists the options"),
     ],
 )

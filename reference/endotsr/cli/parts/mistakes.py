@@ -11,6 +11,7 @@ from endotsr.untrusted.sections import unknown_key
 LIKE_ENOUGH = 0.7  # minimum similarity of a suggested option
 LAST_NAME_ONLY = 0.95  # factor for a setting named without its section, to prefer an option of that name
 MOST_OFFERED = 3
+OTHER_DASHES = "\N{EM DASH}\N{EN DASH}\N{MINUS SIGN}"  # that text programs make of hyphens
 
 
 def unknown_word(fields: list[Field], words: list[str], command: str) -> InputError:
@@ -26,6 +27,15 @@ def unknown_word(fields: list[Field], words: list[str], command: str) -> InputEr
     offered = _similar(option, option_names(fields))
     advice = f"did you mean {' or '.join(offered)}?" if offered else f"`endotsr {command} --help` lists the options"
     return InputError(f"{option}: no such option; {advice}")
+
+
+def refuse_other_dashes(fields: list[Field], words: list[str]) -> None:
+    """Refuse an option whose two hyphens have become a dash, as in text that was copied from a text program."""
+    names = option_names(fields)
+    for word in words:
+        meant = "--" + word.split("=")[0].lstrip(f"{OTHER_DASHES}-")
+        if word.startswith(tuple(OTHER_DASHES)) and meant in names:
+            raise InputError(f"{word}: begins with a dash in place of two hyphens; did you mean {meant}?")
 
 
 def option_names(fields: list[Field]) -> list[str]:

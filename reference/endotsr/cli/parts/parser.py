@@ -20,7 +20,7 @@ import msgspec
 
 from endotsr.cli.parts.fields import REQUIRED, Field, fields_of
 from endotsr.cli.parts.help_page import help_page, short_fields, terminal_width
-from endotsr.cli.parts.mistakes import unknown_word
+from endotsr.cli.parts.mistakes import refuse_other_dashes, unknown_word
 from endotsr.cli.parts.related_options import FACTS, RELATIONS
 from endotsr.cli.parts.relations import check_relations
 from endotsr.config import merged
@@ -50,6 +50,7 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
         shown = fields if HELP_ALL in words else short_fields(fields)
         print(help_page(options, shown, command, terminal_width(), len(fields) - len(shown)), end="")
         raise SystemExit(0)
+    refuse_other_dashes(fields, words)
     given, unknown = _given(fields, words)
     if unknown:
         raise unknown_word(fields, unknown, command)

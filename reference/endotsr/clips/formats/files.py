@@ -9,7 +9,7 @@ from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.untrusted.files import open_regular
-from endotsr.untrusted.names import counted, file_name
+from endotsr.untrusted.names import counted, file_name, plain_line
 from endotsr.untrusted.png import LARGEST_FILE
 
 TRUTH = "truth"  # folder of a simulated sequence
@@ -34,9 +34,26 @@ def list_pictures(folder: Path, endings: tuple[str, ...] = (".png",)) -> list[Pa
     files = [file for file in visible_files(folder) if file.suffix.lower() in endings]
     if not files:
         kinds = "PNG file" if endings == (".png",) else f"PNG file, and none that ends in {', '.join(endings[1:])}"
-        raise InputError(f"{folder}: holds no {kinds}")
+        raise InputError(f"{folder}: holds no {kinds}{_what_else(folder)}")
     _check_names_are_text(files)
     return [files[i] for i in time_order(files)]
+
+
+def _what_else(folder: Path) -> str:
+    """What a folder without pictures holds, as the end of a message; nothing for an empty one."""
+    entries = sorted(folder.iterdir())
+    seen = [file for file in entries if not file.name.startswith(".")]
+    inner = [plain_line(entry.name) for entry in seen if entry.is_dir()]
+    if inner:
+        return f"; it holds {'the folder' if len(inner) == 1 else 'the folders'} {shortened(inner)}: give one of them"
+    endings = Counter(file.suffix.lower() for file in seen)
+    if endings:
+        ending, count = endings.most_common(1)[0]
+        return f"; it holds {counted(count, 'file')} " + (
+            f"of the ending {plain_line(ending)}" if ending else "without an ending"
+        )
+    hidden = f"; it holds {counted(len(entries), 'file')} whose name begins with a dot, as hidden files do: rename them"
+    return hidden if entries else "; it is empty"
 
 
 def time_order(files: list[Path]) -> list[int]:

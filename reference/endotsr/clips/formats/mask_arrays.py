@@ -34,6 +34,6 @@ def array_plane(path: Path) -> NDArray:
     if wrong.any():
         raise InputError(
             f"{path}: holds {plane[wrong][0]:g}; use whole numbers from 0 to {LARGEST}, or True and False;"
-            f' a threshold makes a mask: numpy.save("{file.stem}.npy", array > 0.5)'
+            f' a threshold makes a mask: numpy.save("{file.stem}.npy", array > {0 if np.nanmin(plane) < 0 else 0.5})'
         )
     return plane.astype(np.uint8 if array.dtype.itemsize == 1 else np.uint16)

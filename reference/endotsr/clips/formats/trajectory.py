@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.formats.camera import pose_of, scene_factor
-from endotsr.clips.formats.trajectory_lines import stored_poses
+from endotsr.clips.formats.trajectory_lines import StoredPose, stored_poses
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
@@ -25,6 +25,9 @@ TICKS = (
     (1e11, 1e-3, "milliseconds"),
     (-np.inf, 1.0, "seconds"),
 )
+
+
+USUAL_UNIT = "m"  # of the positions, without an option
 
 
 class Trajectory(NamedTuple):
@@ -60,7 +63,12 @@ def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", a
 
     Raises:  InputError naming the line and the reason.
     """
-    rows, stamped, notes = stored_poses(Path(path))
+    rows, stamped, notes, stated = stored_poses(Path(path))
+    if stated not in ("", unit) and unit == USUAL_UNIT:  # another one was stated with the command
+        raise InputError(
+            f"{path}: its head line states positions in {stated}, and they are read in {unit}; use"
+            f" --trajectory-unit {stated}"
+        )
     descends = next((row.where for before, row in pairwise(rows) if row.stamp < before.stamp), "")
     if descends:
         notes = [*notes, f"{descends.removeprefix(f'{path}: ')}: stamps go back: the poses are sorted by their stamps"]
@@ -68,9 +76,18 @@ def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", a
     for before, row in pairwise(rows):
         if before.stamp == row.stamp:
             raise InputError(f"{row.where}: the stamp {row.stamp:.12g} occurs twice")
+    if len(rows) > 1 and all(_same_pose(rows[0], row) for row in rows):
+        notes = [*notes, f"all {len(rows)} poses are the same: the camera is read as one that stands still"]
     scale = scene_factor(unit)
     poses = [pose_of(row.rotation, row.position * scale, direction, axes, row.where) for row in rows]
     return Trajectory(np.array([row.stamp for row in rows], np.float64), poses, Path(path), stamped, tuple(notes))
+
+
+def _same_pose(one: StoredPose, other: StoredPose) -> bool:
+    """Whether two poses differ by no more than rounding."""
+    return bool(
+        np.allclose(one.rotation, other.rotation, 0, 1e-9) and np.allclose(one.position, other.position, 0, 1e-9)
+    )
 
 
 def poses_of_frames(

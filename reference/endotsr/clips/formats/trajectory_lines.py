@@ -16,7 +16,7 @@ from endotsr.clips.formats.plain_arrays import read_npy
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_text
-from endotsr.untrusted.names import decimal_commas
+from endotsr.untrusted.names import decimal_commas, shown
 
 COLUMNS = (7, 8, 12, 16)
 ALLOWED = (
@@ -24,6 +24,17 @@ ALLOWED = (
     " them; or other columns that a head line names"
 )
 LONGEST_HEAD = 4096  # characters; the search for brackets takes the square of it
+OTHER_KINDS = {
+    ".json": "JSON is not read here; write one line for each pose",
+    ".xlsx": "a workbook is not read; save its sheet as CSV",
+    ".xls": "a workbook is not read; save its sheet as CSV",
+    ".ods": "a workbook is not read; save its sheet as CSV",
+    ".npz": 'an archive of arrays is not read; write one of them with numpy.save("poses.npy", array)',
+    ".mat": 'a MAT-file is not read; scipy.io.loadmat gives its arrays, and numpy.save("poses.npy", array) writes one',
+    ".bag": "a ROS bag is not read; export the topic of the poses as text, as `rostopic echo -p` does",
+}
+MESSAGE = re.compile(r"(?:\w+\.)+(?=(?:position|orientation|translation|rotation)\.)")  # names of ROS before these
+UNIT = re.compile(r"[xyz]\s*(?:[\[(]\s*|_)(um|mm|cm|m)\b")  # behind the name of a column, in lower case
 NORM_TOLERANCE = 1e-2  # of a quaternion written with few digits
 # Names in head lines, in lower case: the axis is the last letter, behind q, t, p or the words that stand for them.
 QUATERNION = re.compile(r"(?:q|quat|quaternion|rot|orientation)(?:[._]\w*?)??[._]?([wxyz])")
@@ -55,14 +66,17 @@ class StoredPoses(NamedTuple):
     rows: list[StoredPose]
     stamped: bool  # False: the stamps count from 0
     notes: list[str]
+    unit: str = ""  # of the positions, if the head line states one
 
 
 def stored_poses(path: Path) -> StoredPoses:
     """The poses of a file. Raises InputError naming the line and the reason."""
     if path.suffix.lower() == ".npy":
-        lines, head = _array_lines(path), []
+        lines, head, unit = _array_lines(path), [], ""
     else:
-        lines, head = _text_lines(path)
+        if (why := OTHER_KINDS.get(path.suffix.lower())) is not None:
+            raise InputError(f"{path}: {why}; {ALLOWED}")
+        lines, head, unit = _text_lines(path)
     if not lines:
         raise InputError(f"{path}: holds no pose; {ALLOWED}")
     sizes = {len(row) for _, row in lines}
@@ -81,7 +95,7 @@ def stored_poses(path: Path) -> StoredPoses:
         found.append(
             StoredPose(float(k) if stamp is None else row[stamp], _rotation(quaternion, where), position, where)
         )
-    return StoredPoses(found, stamp is not None, notes)
+    return StoredPoses(found, stamp is not None, notes, unit)
 
 
 def _columns_of(path: Path, head: list[str], size: int) -> tuple[list[str], list[str]]:
@@ -113,26 +127,48 @@ def _array_lines(path: Path) -> list[tuple[str, list[float]]]:
     return [(f"{path}: row {i}", row) for i, row in enumerate(rows.tolist())]
 
 
-def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str]]:
-    """Place and numbers of every line, and the columns that a head line names; a head line may have no mark."""
+def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str], str]:
+    """Place and numbers of every line, the columns that a head line names, and its unit; it may have no mark."""
     found: list[tuple[str, list[float]]] = []
     head: list[str] = []
+    unit = ""
     for number, line in enumerate(_text(path).splitlines(), 1):
-        words, where = re.sub(r"[\[\],;]", " ", line).split(), f"{path}: line {number}"
-        if not words or words[0].startswith("#"):
-            head = _named_columns(line) or head
+        words, where = re.sub(r"[\[\],;\"]", " ", re.sub(r"(?<=\d)\s+#.*", "", line)).split(), f"{path}: line {number}"
+        row = _numbers(words, head)
+        if not words or words[0].startswith("#") or (row is None and not found and _named_columns(line)):
+            if named := _named_columns(line):
+                head, unit = named, _stated_unit(line)
             continue
-        try:
-            row = [float(word) for word in words]
-        except ValueError:
-            row = []
-        if not row and not found and _named_columns(line):
-            head = _named_columns(line)
-            continue
-        if not row or len(row) not in (*COLUMNS, len(head)) or not np.isfinite(row).all():
-            raise InputError(f"{where}: {ALLOWED}{decimal_commas(line)}{_angles(line)}")
+        if row is None or len(row) not in (*COLUMNS, len(head)) or not np.isfinite(row).all():
+            raise InputError(f"{where}: {ALLOWED}{_no_number(words)}{decimal_commas(line)}{_angles(line)}")
         found.append((where, row))
-    return found, head
+    return found, head, unit
+
+
+def _numbers(words: list[str], head: list[str]) -> list[float] | None:
+    """The numbers of a line, 0 for a column that is not used, such as the name of a frame; None if a word is none."""
+    names = head if len(head) == len(words) else USED[:1] * len(words)  # without names, every column is used
+    used = [k == 0 or name in USED for k, name in enumerate(names)]
+    try:
+        return [float(word) if needed else 0.0 for word, needed in zip(words, used, strict=True)]
+    except ValueError:
+        return None
+
+
+def _stated_unit(line: str) -> str:
+    """The unit that a head line states behind the names of the columns, such as `tx [mm]` or `tx_mm`; "" without."""
+    stated = set(UNIT.findall(line.lower()))
+    return stated.pop() if len(stated) == 1 else ""
+
+
+def _no_number(words: list[str]) -> str:
+    """The end of a message about a line with a word that is no number; else nothing."""
+    for word in words:
+        try:
+            float(word)
+        except ValueError:
+            return f"; {shown(word)} is no number"
+    return ""
 
 
 def _text(path: Path) -> str:
@@ -151,11 +187,11 @@ def _named_columns(line: str) -> list[str]:
     """The columns that a line names: stamp, tx .. qw, others as they are; [] unless it names a pose."""
     if len(line) > LONGEST_HEAD:
         return []
-    plain = re.sub(r"\[[^\]]*\]|\([^)]*\)|#", " ", line).replace(";", ",")
+    plain = re.sub(r"\[[^\]]*\]|\([^)]*\)|[#\"]", " ", line).replace(";", ",")
     words = [word.strip() for word in (plain.split(",") if "," in plain else plain.split())]
     found = []
     for k, word in enumerate(word for word in words if word):
-        lower = word.lower()
+        lower = re.sub(r"_(?:um|mm|cm|m)$", "", MESSAGE.sub("", re.sub(r"\s+", "_", word.lower())))
         if turned := QUATERNION.fullmatch(lower):
             found.append(f"q{turned[1]}")
         elif moved := POSITION.fullmatch(lower):

@@ -3,6 +3,7 @@
 In: the path. Out: the end of a refusal; "" if nothing follows from what is there.
 """
 
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -26,6 +27,16 @@ OTHER_VIDEOS = (".gif", ".apng", ".y4m", ".ogv", ".ogg", ".ivf", ".mjpeg", ".mjp
 def what_it_is(path: Path) -> str:
     """What a path in no known layout is, after a colon, with the remedy; "" if none follows from it."""
     return _of_file(path) if path.is_file() else _of_folder(path)
+
+
+def not_there(path: Path) -> str:
+    """Why a source is not found, for a message."""
+    text = str(path)
+    if re.match(r"[a-z]{2,}:/", text):  # a path has lost one of the two strokes
+        return "is an address; download the file, and give its path"
+    if re.search(r"[*?]|%\d*d", path.name):
+        return f"not found; give the folder of the pictures, {path.parent}, without a pattern"
+    return "not found"
 
 
 def _of_file(path: Path) -> str:

@@ -21,6 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 sys.path.insert(0, str(Path(__file__).parents[3]))
 import one_view
+from brought_inputs import BROUGHT_ROWS
 from careless_inputs import CARELESS_ROWS
 from depth_folders import WRONG as NO_LENGTHS
 from depth_folders import true_depth
@@ -443,6 +444,7 @@ ROWS = [
     *STRANGE_ROWS,
     *EXPORTED_ROWS,
     *SURGEON_ROWS,
+    *BROUGHT_ROWS,
 ]  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from endotsr.clips.sequences.poses import POSE_FILES
 from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES, MASKS
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import MASK_ENDINGS
-from endotsr.clips.sequences.unknown_source import what_it_is
+from endotsr.clips.sequences.unknown_source import not_there, what_it_is
 from endotsr.clips.sequences.unread import folders_of, together, unread
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
@@ -69,7 +69,9 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
             raise InputError(f"layout {name!r} is not allowed; use one of auto, {', '.join(found)}")
         return found[name]
     if not path.exists():
-        raise InputError(f"{path}: not found")
+        raise InputError(f"{path}: {not_there(path)}")
+    if not (path.is_file() or path.is_dir()):
+        raise InputError(f"{path}: is neither a file nor a folder; use one of them")
     for layout in layouts():
         if layout.recognises(path):
             return layout
@@ -82,7 +84,7 @@ def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
     path = Path(path)
     layout = layout_of(path, options.layout)
     if options.layout != "auto" and not path.exists():
-        raise InputError(f"{path}: not found")
+        raise InputError(f"{path}: {not_there(path)}")
     refuse_unused(layout, path, options)
     clip = without_faults(layout.describe(path, options))
     _refuse_unknown_unit(clip, options)
