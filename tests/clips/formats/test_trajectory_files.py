@@ -62,3 +62,11 @@ def test_the_unit_of_a_head_line_is_not_read_as_metres(head, tmp_path):
         else:
             with pytest.raises(InputError, match=f"states positions in {stated}.*use --trajectory-unit {stated}"):
                 read_trajectory(tmp_path / "t.csv", unit)
+
+
+def test_a_name_in_a_column_that_is_not_used_is_not_the_reason(tmp_path):
+    """The number that is not finite is; the name of the frame is read over."""
+    (tmp_path / "t.csv").write_text("t,frame_id,x,y,z,qx,qy,qz,qw\n0,map,nan,0,0,0,0,0,1\n")
+    with pytest.raises(InputError, match="line 2: use 8 finite numbers") as caught:
+        stored_poses(tmp_path / "t.csv")
+    assert "no number" not in str(caught.value)

@@ -25,8 +25,6 @@ TICKS = (
     (1e11, 1e-3, "milliseconds"),
     (-np.inf, 1.0, "seconds"),
 )
-
-
 USUAL_UNIT = "m"  # of the positions, without an option
 
 

@@ -134,21 +134,27 @@ def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str], s
     unit = ""
     for number, line in enumerate(_text(path).splitlines(), 1):
         words, where = re.sub(r"[\[\],;\"]", " ", re.sub(r"(?<=\d)\s+#.*", "", line)).split(), f"{path}: line {number}"
-        row = _numbers(words, head)
+        used = _used(words, head)
+        row = _numbers(words, used)
         if not words or words[0].startswith("#") or (row is None and not found and _named_columns(line)):
             if named := _named_columns(line):
                 head, unit = named, _stated_unit(line)
             continue
         if row is None or len(row) not in (*COLUMNS, len(head)) or not np.isfinite(row).all():
-            raise InputError(f"{where}: {ALLOWED}{_no_number(words)}{decimal_commas(line)}{_angles(line)}")
+            raise InputError(f"{where}: {ALLOWED}{_no_number(words, used)}{decimal_commas(line)}{_angles(line)}")
         found.append((where, row))
     return found, head, unit
 
 
-def _numbers(words: list[str], head: list[str]) -> list[float] | None:
+def _used(words: list[str], head: list[str]) -> list[bool]:
+    """Whether each word of a line is of a column that is used; without a name for each, all are."""
+    if len(head) != len(words):
+        return [True] * len(words)
+    return [k == 0 or name in USED for k, name in enumerate(head)]
+
+
+def _numbers(words: list[str], used: list[bool]) -> list[float] | None:
     """The numbers of a line, 0 for a column that is not used, such as the name of a frame; None if a word is none."""
-    names = head if len(head) == len(words) else USED[:1] * len(words)  # without names, every column is used
-    used = [k == 0 or name in USED for k, name in enumerate(names)]
     try:
         return [float(word) if needed else 0.0 for word, needed in zip(words, used, strict=True)]
     except ValueError:
@@ -161,12 +167,10 @@ def _stated_unit(line: str) -> str:
     return stated.pop() if len(stated) == 1 else ""
 
 
-def _no_number(words: list[str]) -> str:
-    """The end of a message about a line with a word that is no number; else nothing."""
-    for word in words:
-        try:
-            float(word)
-        except ValueError:
+def _no_number(words: list[str], used: list[bool]) -> str:
+    """The end of a message about a line with a word that is no number in a column that is used; else nothing."""
+    for word, needed in zip(words, used, strict=True):
+        if needed and _numbers([word], [True]) is None:
             return f"; {shown(word)} is no number"
     return ""
 

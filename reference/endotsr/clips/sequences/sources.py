@@ -16,7 +16,7 @@ from endotsr.clips.formats.camera import ARBITRARY, Intrinsics, checked_intrinsi
 from endotsr.clips.formats.depth_stacks import ENDINGS as ARRAY_ENDINGS
 from endotsr.clips.formats.depth_stacks import stack_planes
 from endotsr.clips.formats.files import list_pictures
-from endotsr.clips.formats.trajectory import poses_of_frames, read_trajectory
+from endotsr.clips.formats.trajectory import USUAL_UNIT, poses_of_frames, read_trajectory
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
@@ -193,7 +193,7 @@ def stated_poses(
     """The poses of `--trajectory`, and a note; (None, []) without it. See `poses_of_frames`. Raises InputError."""
     if options.trajectory is None:
         return None, []
-    unit = options.trajectory_unit or "m"
+    unit = options.trajectory_unit or USUAL_UNIT
     trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes or "opencv")
     poses, how = poses_of_frames(trajectory, count, rate, times, numbers, clock)
     return poses, ["; ".join([f"{options.trajectory.name}: {how}", f"positions in {unit}", *trajectory.notes])]
@@ -203,7 +203,7 @@ def unit_of(options: SourceOptions) -> str:
     """`mm` or `arbitrary`, by the units of trajectory (default: m) and depth. Raises InputError if they contradict."""
     stated = []
     if options.trajectory is not None:
-        stated.append(options.trajectory_unit or "m")
+        stated.append(options.trajectory_unit or USUAL_UNIT)
     if options.depth is not None:
         stated.append(options.depth_unit)
     if len({unit == ARBITRARY for unit in stated}) > 1:

@@ -20,7 +20,7 @@ from endotsr.clips.formats.camera import StereoCalibration, checked_rotation, in
 from endotsr.clips.formats.files import shortened, visible_files
 from endotsr.clips.formats.picture_fields import picture_notes
 from endotsr.clips.formats.time_lists import TimedFile, nanosecond_list
-from endotsr.clips.formats.trajectory import poses_at, read_trajectory
+from endotsr.clips.formats.trajectory import USUAL_UNIT, poses_at, read_trajectory
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import Layout
@@ -146,7 +146,7 @@ def _poses(body: Path, options: SourceOptions, times: np.ndarray, notes: list[st
     truth = body / TRUTH / LIST
     if options.trajectory is not None:
         stated = read_trajectory(
-            options.trajectory, options.trajectory_unit or "m", options.direction, options.axes or "opencv"
+            options.trajectory, options.trajectory_unit or USUAL_UNIT, options.direction, options.axes or "opencv"
         )
         notes += [f"{options.trajectory.name}: poses of the camera", *stated.notes]
         notes += [f"{TRUTH}: not used, because --trajectory is stated"] if truth.is_file() else []

@@ -14,7 +14,7 @@ from endotsr.clips.formats.calibrations import StatedCamera, calibrated
 from endotsr.clips.formats.camera import Intrinsics
 from endotsr.clips.formats.files import shortened, visible_files
 from endotsr.clips.formats.picture_fields import picture_notes
-from endotsr.clips.formats.trajectory import TICKS, poses_at, read_trajectory
+from endotsr.clips.formats.trajectory import TICKS, USUAL_UNIT, poses_at, read_trajectory
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip, Depth
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
@@ -117,7 +117,7 @@ def _poses(
     where = options.trajectory or next(iter(given), None)
     if where is None:
         return None
-    found = read_trajectory(where, options.trajectory_unit or "m", options.direction).in_seconds()
+    found = read_trajectory(where, options.trajectory_unit or USUAL_UNIT, options.direction).in_seconds()
     others = "".join(f"; not read: {file.name}" for file in given if file != where)
     notes += [f"poses of {where.name}{others}", *found.notes]
     return poses_at(found, times, LONGEST)
