@@ -107,16 +107,16 @@ def opening(result: dict[str, Any], found: list[Row]) -> list[str]:
     alive, known = len(real) - shares["any"], len(result["defects"])
     seen = sum(any(c >= 0 for c in codes) for _, codes in result["defects"].values())
     first = (
-        f"The tests detect {percent(shares['any'], len(real))} of {len(real)} deliberate errors in the numerical "
-        f"modules, and {seen} of {known} mistakes that a port could make. "
-        + ("None survives." if not alive else f"{alive} survive and are listed below.")
-        + f" {len(found) - len(real)} more changes are judged equivalent and are not counted (measured "
-        f"{result['run']['finished'][:10]})."
+        f"On {result['run']['finished'][:10]} the tests detected {percent(shares['any'], len(real))} of {len(real)} "
+        f"deliberate errors in the numerical modules of that day, and {seen} of {known} mistakes that a port could "
+        "make. "
+        + ("None survived." if not alive else f"{alive} survived and are listed below.")
+        + f" {len(found) - len(real)} more changes are judged equivalent and are not counted."
     )
     alone = ", ".join(
         f"{s} {percent(shares[s], len(real))}" for s in sorted(result["suites"], key=lambda s: -shares[s])
     )
-    second = f"Each suite alone detects: {alone}."
+    second = f"Each suite alone detected: {alone}."
     return [*wrapped(first), "", *wrapped(second), "", "![Detected errors, by suite](results/discrimination.svg)", ""]
 
 

@@ -82,6 +82,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "cutting.cutoff": Figure(CLAMPED, "points.name=alpha cutoff 1/255.error.max", "{:.0f}", 255),
     "cutting.alpha": Figure(CLAMPED, "points.79.error.rms", "{:.3f}", 255),  # alpha clamp 0.99
     "right.baseline": Figure(WITHOUT, "measures.right_view.baseline", "{:.1f}"),
+    "right.rows": Figure(WITHOUT, "rows_apart", "{:.1f}"),
     "right.sharp": Figure(VIEWS, f"{OF_SHARP}.right_view.{MODEL}.held_out_psnr", "{:.2f}"),
     "right.sharp.training": Figure(VIEWS, f"{OF_SHARP}.right_view.{MODEL}.training_psnr", "{:.2f}"),
     "right.moved": Figure(WITHOUT, f"measures.right_view.{MOVED}.held_out_psnr", "{:.2f}"),

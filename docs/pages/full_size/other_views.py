@@ -5,8 +5,8 @@
     python docs/make.py full_size.sweeps measure other_views DIR/results.json
     python docs/make.py full_size.other_views measure docs/results/sweeps/pulling_pairs
 
-The first three commands train and store the scenes, the last one measures the predictions on the same frames and writes
-the table. The right pictures of pulling are one frame early; the first command joins pairs of one moment.
+The first three commands train and store the scenes, the last one measures the predictions on the same frames, and how
+far apart the rows of its pairs are, and writes the table. The right pictures of pulling are one frame early; the first command joins pairs of one moment.
 """
 
 import argparse
@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from endotsr.clips.simulator import SimulatorSettings
@@ -31,6 +32,8 @@ from pages.store.program import Program
 from pages.store.tables import noted, where
 
 MODEL, MOVED = "this model", "left picture moved by the prior depth"
+CLEAR = 0.7  # of the distance of the second descriptor: Lowe's ratio test
+FAR = 8  # rows
 COLUMNS = {  # measurement -> its columns: key, head, decimals
     "right_view": (("held_out_psnr", "Right camera, held-out times, dB", 2),
                    ("training_psnr", "Right camera, training times, dB", 2)),
@@ -58,7 +61,28 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             raise InputError(f"{source}: {name}: {entry['reason']}")
         entry["rows"] = [row for row in entry.get("rows", ()) if row["label"] != MODEL]
     hashes = input_record(source, sequence, PAPER, SimulatorSettings()).get("arrays_sha256", {})
-    return {"clip": Path(source).name, "measures": found, "arrays_sha256": hashes}
+    apart = rows_apart(options.clip)
+    return {"clip": Path(source).name, "measures": found, "rows_apart": apart, "arrays_sha256": hashes}
+
+
+def rows_apart(clip: Path) -> list[float]:
+    """The median vertical distance of matched points of a pair, in pixels, at every eighth frame.
+
+    Points that differ by more than FAR rows are wrong matches, such as those on the instruments.
+    """
+    found = []
+    for left, right in list(zip(*(sorted((clip / side).glob("*.png")) for side in ("images", "images_right"))))[::8]:
+        first, second = (described(path) for path in (left, right))
+        pairs = cv2.BFMatcher().knnMatch(first[1], second[1], k=2)
+        kept = [near for near, other in pairs if near.distance < CLEAR * other.distance]
+        rows = np.array([first[0][one.queryIdx].pt[1] - second[0][one.trainIdx].pt[1] for one in kept])
+        found.append(float(np.median(np.abs(rows[np.abs(rows) < FAR]))))
+    return found
+
+
+def described(path: Path) -> tuple[Any, Any]:
+    """The SIFT points of a picture and their descriptors."""
+    return cv2.SIFT_create().detectAndCompute(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), None)
 
 
 def table(record: Mapping[str, Any]) -> str:
