@@ -5,8 +5,9 @@
     python docs/make.py full_size.sweeps measure other_views DIR/results.json
     python docs/make.py full_size.other_views measure docs/results/sweeps/pulling_pairs
 
-The first three commands train and store the scenes, the last one measures the predictions on the same frames, and how
-far apart the rows of its pairs are, and writes the table. The right pictures of pulling are one frame early; the first command joins pairs of one moment.
+The first three commands train and store the scenes. The last one measures the predictions on the same frames, and how
+far apart the rows of the pairs are, and writes the table. The right pictures of pulling are one frame early; the first
+command joins pairs of one moment.
 """
 
 import argparse
