@@ -15,9 +15,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
+from PIL import Image
 
+from endotsr.clips.opencv.geometry import features_of, matched_features
 from endotsr.clips.simulator import SimulatorSettings
 from endotsr.config import PAPER
 from endotsr.errors import InputError
@@ -33,7 +34,6 @@ from pages.store.program import Program
 from pages.store.tables import noted, where
 
 MODEL, MOVED = "this model", "left picture moved by the prior depth"
-CLEAR = 0.7  # of the distance of the second descriptor: Lowe's ratio test
 FAR = 8  # rows
 COLUMNS = {  # measurement -> its columns: key, head, decimals
     "right_view": (("held_out_psnr", "Right camera, held-out times, dB", 2),
@@ -67,23 +67,18 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def rows_apart(clip: Path) -> list[float]:
-    """The median vertical distance of matched points of a pair, in pixels, at every eighth frame.
+    """The median vertical distance of matched features of a pair, in pixels, at every eighth frame.
 
-    Points that differ by more than FAR rows are wrong matches, such as those on the instruments.
+    Features that differ by more than FAR rows are wrong matches, such as those on the instruments.
     """
     found = []
-    for left, right in list(zip(*(sorted((clip / side).glob("*.png")) for side in ("images", "images_right"))))[::8]:
-        first, second = (described(path) for path in (left, right))
-        pairs = cv2.BFMatcher().knnMatch(first[1], second[1], k=2)
-        kept = [near for near, other in pairs if near.distance < CLEAR * other.distance]
-        rows = np.array([first[0][one.queryIdx].pt[1] - second[0][one.trainIdx].pt[1] for one in kept])
-        found.append(float(np.median(np.abs(rows[np.abs(rows) < FAR]))))
+    for pair in list(zip(*(sorted((clip / side).glob("*.png")) for side in ("images", "images_right"))))[::8]:
+        greys = [np.array(Image.open(path).convert("L")) for path in pair]
+        left, right = (features_of(grey, np.ones(grey.shape, bool)) for grey in greys)
+        here, there = matched_features(left, right)
+        rows = np.abs(left.place[here, 1] - right.place[there, 1])
+        found.append(float(np.median(rows[rows < FAR])))
     return found
-
-
-def described(path: Path) -> tuple[Any, Any]:
-    """The SIFT points of a picture and their descriptors."""
-    return cv2.SIFT_create().detectAndCompute(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), None)
 
 
 def table(record: Mapping[str, Any]) -> str:
