@@ -325,8 +325,8 @@ assert gain("motion", "A")[1] < -2 < gain("slow motion", "A")[1] - 2, "only a sl
 # %% [markdown]
 # With one breath in the clip, two neighbouring frames are nearly equal, and the painted colour is right between them as
 # well: A gains on held-out frames. With four breaths, a held-out frame is 1/6 of a breath away from its neighbours. No
-# loss constrains the painted colour there, and A loses more than two decibels. A gain on training frames occurs in both cases
-# and does not distinguish them.
+# loss constrains the painted colour there, and the held-out frames lose with A. A gain on training frames occurs in both
+# cases and does not distinguish them.
 #
 # How this change of the PSNR depends on the rate is not obvious. The next cell adds two rates, with one seed each.
 

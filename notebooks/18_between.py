@@ -15,9 +15,9 @@
 #
 # Apart from chapter 14, which trains its full sequence with the targets of this chapter, every loss on images so far is
 # computed at the time of a training frame, and none reads a render between two of them. In {doc}`00_why` a clip
-# breathes four times. There the colour residual gains on the training frames and loses more than two decibels on the held-out
-# frames. The preset `sharp` therefore also renders times between the frames. It compares these renders with targets
-# that are made from both frames, moved along their optical flow.
+# breathes four times. There the colour residual gains on the training frames and loses on the held-out frames. The
+# preset `sharp` therefore also renders times between the frames. It compares these renders with targets that are made
+# from both frames, moved along their optical flow.
 #
 # The equation is {eq}`eq-b14` of {doc}`/specification/b14_between`. It is optional and not in the paper.
 
@@ -133,7 +133,7 @@ assert swing[both] < swing[alone] - 2
 # %% [markdown]
 # If the model is trained only on frames, its PSNR has a peak at most training times. It is lowest near the held-out
 # frames, where the gap is twice as wide. With targets it still varies, but less: the training frames lose less than a
-# decibel, and the held-out frames gain more than three.
+# decibel, and the held-out frames gain more than that.
 #
 # ## The equation
 #
@@ -441,7 +441,7 @@ assert abs(of_q[0] - 0.5) < 0.05 and of_q[2] < of_q[1] - 0.05
 # ## The limit of the targets
 #
 # A target is a picture. It determines the colour at a time, but not which Gaussian should have this colour. The clip
-# above shows the difference: the held-out frames gain more than three decibels, but the Gaussians still do not move.
+# above shows the difference: the held-out frames gain, but the Gaussians still do not move.
 
 # %%
 for name, run in runs.items():
