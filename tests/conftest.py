@@ -11,6 +11,10 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, settings
 
+from endotsr.cli.main import BLAS
+
+os.environ.setdefault(*BLAS)  # as the command does: threads of BLAS beside other workers wait actively for one another
+
 HERE = Path(__file__).parent
 # Helpers of these folders are used in other folders too.
 FOLDERS = ("clips", "clips/sequences/inputs", "method/splatting")

@@ -181,7 +181,7 @@ def test_difference_images_stand_in_the_page(golden, answered, tmp_path):
     try:
         path.write_bytes(npy_bytes(np.array(read_plain(path)[:, ::-1])))
         page = tmp_path / "page.html"
-        assert run(["judge", str(folder), "--precision", precision, "--html", str(page)]) == 1
+        assert run(["judge", str(folder), "--precision", precision, "--html", str(page), "--search", "0"]) == 1
         assert page.read_text().count("data:image/png;base64,") == 3
     finally:
         path.write_bytes(kept)
