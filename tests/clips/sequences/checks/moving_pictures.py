@@ -1,5 +1,7 @@
 """Small pictures of tissue that moves, and those of recorded clips, for the checks of frames one after another."""
 
+from functools import cache
+
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
@@ -22,7 +24,8 @@ def tissue(count, period=40.0):
     return found
 
 
-def recorded(name, every=1, part=(slice(None), slice(None))):
-    """Small pictures of a recorded clip, or of a part of each."""
-    files = sorted((data_folder(name) / "images").iterdir())[::every]
-    return [small_picture(read_picture(file)[part]) for file in files]
+@cache
+def recorded(name):
+    """Small pictures of a recorded clip, and small pictures of a part of each."""
+    pictures = [read_picture(file) for file in sorted((data_folder(name) / "images").iterdir())]
+    return [[small_picture(picture[part]) for picture in pictures] for part in (np.s_[:], np.s_[256:512, 320:640])]

@@ -4,8 +4,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from data_folder import data_folder
-from endotsr.clips.opencv.png import read_png
+from data_folder import data_folder, recorded_masks
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks import late
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.late import FARTHEST, FEWEST, LateParts, loaded_late_findings
@@ -13,6 +13,7 @@ from endotsr.clips.sequences.checks.stereo import late_steps_finding
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PAPER
+from synthetic_folder import identity_rows
 
 HEIGHT, WIDTH, FRAMES = 64, 96, 40
 
@@ -64,7 +65,7 @@ def test_a_still_mask_colours_without_difference_and_frames_without_masks_have_n
 
 @pytest.mark.parametrize("name", ["everything", "pulling"])
 def test_a_simulated_clip_has_no_finding_and_its_late_masks_have_one(name):
-    settings = msgspec.structs.replace(named_scene(name), frames=48, width=160, height=128)
+    settings = msgspec.structs.replace(named_scene(name), frames=30, width=160, height=128)
     clip = simulate(settings).sequence
     assert loaded_late_findings(clip, "masks", "depth") == []
     if name == "everything":  # the instrument of the other scene stays
@@ -87,30 +88,27 @@ def test_steps_of_a_right_view_tell_its_moment(lag):
     assert late_steps_finding(np.ones(60), right, "right") == late_steps_finding(left, np.zeros(60), "right") == []
 
 
-@pytest.mark.data
-@pytest.mark.parametrize("name", ["endonerf_pulling", "endonerf_cutting"])
-def test_the_recorded_clips_have_no_finding_and_have_one_with_late_files(name, tmp_path):
-    given = data_folder(name)
-    files = {part: sorted((given / part).iterdir()) for part in ("images", "masks", "depth")}
-    for moved, code in ((None, None), ("masks", "late-masks"), ("depth", "late-depth")):
-        folder = tmp_path / f"{moved}"
-        for part, known in files.items():
-            (folder / part).mkdir(parents=True)
-            for i in range(40):
-                shift = 5 if part == moved else 0
-                (folder / part / f"{i:06d}.png").symlink_to(known[i + 5 - shift])
-        np.save(folder / "poses_bounds.npy", np.load(given / "poses_bounds.npy")[:40])
+def test_check_names_late_masks_and_late_depth(tmp_path):
+    for lags, code in (((0, 0), None), ((3, 0), "late-masks"), ((0, 3), "late-depth")):
+        folder = tmp_path / f"{code}"
+        for name in ("images", "masks", "depth"):
+            (folder / name).mkdir(parents=True)
+        for t in range(2 * FARTHEST + FEWEST):
+            planes = moment(t)[0], 255 * ~moment(t - lags[0])[1], moment(t - lags[1])[2]
+            for name, plane in zip(("images", "masks", "depth"), planes):
+                write_png(folder / name / f"{t:06d}.png", plane.astype(np.uint8))
+        np.save(folder / "poses_bounds.npy", identity_rows(2 * FARTHEST + FEWEST, WIDTH, HEIGHT))
         codes = {f.code for f in check_sequence(folder, PAPER).findings}
-        assert codes & {"late-masks", "late-depth"} == ({code} if code else set()), moved
+        assert codes & {"late-masks", "late-depth"} == ({code} if code else set())
 
 
-def recorded(name, frames, rows=slice(None), late=0):
-    """Findings on masks of a part of a clip; those of frames `late` before its frames."""
-    folder, parts = data_folder(name), LateParts()
-    files = [sorted((folder / part).iterdir()) for part in ("images", "gt_masks")]
+def recorded(name, frames, rows=slice(None), late=0, masks="gt_masks", late_depth=None):
+    """Findings on a part of a clip, with masks of `late` frames before, and with depth where its lag is stated."""
+    folder, tissue, parts = data_folder(name), recorded_masks(name, masks), LateParts()
+    pictures, depth = (sorted((folder / part).iterdir()) for part in ("images", "depth"))
     for i in frames:
-        tissue = read_png(files[1][i - late])
-        parts.add(read_png(files[0][i])[rows], (tissue if tissue.ndim == 2 else tissue[..., 0])[rows] < 128, None)
+        prior = None if late_depth is None else read_png(depth[i - late_depth])[rows].astype(np.float32)
+        parts.add(read_png(pictures[i])[rows], tissue[i - late][rows], prior)
     return [f.code for f in parts.findings("masks", "depth")]
 
 
@@ -126,9 +124,11 @@ def test_parts_of_the_recorded_clips_have_no_late_masks(name, frames, rows):
 
 
 @pytest.mark.data
-def test_late_masks_of_a_short_part_are_named():
-    assert recorded("endonerf_cutting", range(5, 40), late=5) == ["late-masks"]
-    assert recorded("endonerf_pulling", range(5, 40), late=5) == ["late-masks"]
+@pytest.mark.parametrize("name", ["endonerf_pulling", "endonerf_cutting"])
+def test_the_recorded_clips_have_a_finding_with_late_files_alone(name):
+    assert recorded(name, range(5, 40), late=5) == ["late-masks"]
+    for masks, depth, expected in ((0, 0, []), (5, 0, ["late-masks"]), (0, 5, ["late-depth"])):
+        assert recorded(name, range(5, 45), late=masks, masks="masks", late_depth=depth) == expected
 
 
 @pytest.mark.parametrize(("limit", "value"), [("INFORMED", 10.0), ("TIMES", 1000.0)])

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from data_folder import data_folder
-from endotsr.clips.opencv.png import read_png
-from endotsr.clips.sequences.checks.check import check_sequence
+from data_folder import recorded_masks
 from endotsr.clips.sequences.checks.masks import MaskSteps, mask_findings
-from endotsr.config import PAPER
 
 
 def test_a_mask_is_unlike_only_where_both_neighbours_agree():
@@ -61,13 +58,16 @@ def test_a_mask_is_compared_with_what_is_usual_in_its_clip():
     assert [f.frame for f in mask_findings(masks, "masks")] == [6]
 
 
+def unlike(masks):
+    """The frames whose mask is unlike its neighbours."""
+    return [found.frame for found in mask_findings(np.asarray(masks), "masks") if found.code == "unlike-mask"]
+
+
 @pytest.mark.data
 def test_the_masks_of_cutting_are_unlike_where_its_stereo_matching_failed():
     """Frames 73 and 74 and, likewise, 145 and 146. Frame 73 stays below the limit: its neighbour is wrong likewise."""
-    found = check_sequence(data_folder("endonerf_cutting"), PAPER).findings
-    assert [f.frame for f in found if f.code == "unlike-mask"] == [74, 145, 146]
-    found = check_sequence(data_folder("endonerf_pulling"), PAPER).findings
-    assert not [f for f in found if f.code == "unlike-mask"]
+    assert unlike(recorded_masks("endonerf_cutting", "masks")) == [74, 145, 146]
+    assert unlike(recorded_masks("endonerf_pulling", "masks")) == []
 
 
 @pytest.mark.parametrize(("rows", "frames"), [(6, []), (10, [6])])
@@ -89,12 +89,8 @@ def test_the_limit_follows_the_motion_of_the_masks(rows, frames):
 @pytest.mark.parametrize("name", ["endonerf_pulling", "endonerf_cutting"])
 def test_fewer_frames_and_parts_of_the_recorded_clips_have_no_unlike_mask(name):
     """The masks of the instruments, which are right: every frame of the second to fourth, and parts of the picture."""
-    files = sorted((data_folder(name) / "gt_masks").iterdir())
-    planes = [read_png(file) for file in files]
-    masks = np.stack([(plane if plane.ndim == 2 else plane[..., 0]) < 128 for plane in planes])
+    masks = np.stack(recorded_masks(name, "gt_masks"))
     for every in (2, 3, 4):
-        for first in (0, 1):
-            assert not [f for f in mask_findings(masks[first::every], "m") if f.code == "unlike-mask"], (every, first)
+        assert unlike(masks[::every]) == unlike(masks[1::every]) == [], every
     for rows, columns in ((256, 0), (0, 320), (192, 240), (128, 160), (256, 320)):
-        part = masks[:, rows : rows + 256, columns : columns + 320]
-        assert not [f for f in mask_findings(part, "m") if f.code == "unlike-mask"], (rows, columns)
+        assert unlike(masks[:, rows : rows + 256, columns : columns + 320]) == [], (rows, columns)

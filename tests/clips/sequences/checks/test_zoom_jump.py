@@ -1,5 +1,7 @@
 """A digital zoom between two frames is named with its factor, and motion is not."""
 
+from itertools import islice
+
 import cv2
 import msgspec
 import numpy as np
@@ -8,10 +10,10 @@ import pytest
 from data_folder import data_folder
 from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.checks.frames import frame_facts, frame_findings
+from endotsr.clips.simulator.frames import make_scene, simulated_frames
 from endotsr.clips.simulator.scenes import named_scene
-from endotsr.clips.simulator.simulate import simulate
 
-HEIGHT, WIDTH, FRAMES, FIRST = 384, 480, 24, 9
+HEIGHT, WIDTH, FRAMES, FIRST = 384, 480, 12, 6
 
 
 def zoomed(picture, factor):
@@ -29,8 +31,9 @@ def said(pictures):
 
 @pytest.fixture(scope="module", params=["pulling", "moving-camera"])
 def pictures(request):
-    settings = msgspec.structs.replace(named_scene(request.param), frames=FRAMES, width=WIDTH, height=HEIGHT)
-    return list(simulate(settings).sequence.images.transpose(0, 2, 3, 1))
+    """The first half of a clip."""
+    settings = msgspec.structs.replace(named_scene(request.param), frames=2 * FRAMES, width=WIDTH, height=HEIGHT)
+    return [frame.image.transpose(1, 2, 0) for frame in islice(simulated_frames(make_scene(settings)), FRAMES)]
 
 
 @pytest.mark.parametrize("factor", [1.15, 1.3, 1.6])
@@ -57,5 +60,5 @@ def test_motion_and_another_scene_are_no_zoom(pictures):
 def test_recorded_clips_have_none_until_they_are_zoomed(name):
     recorded = [read_png(file)[..., :3] for file in sorted((data_folder(name) / "images").iterdir())]
     assert said(recorded) == []
-    ((code, frame, what),) = said([*recorded[:30], *(zoomed(picture, 1.2) for picture in recorded[30:])])
+    ((code, frame, what),) = said([*recorded[:30], *(zoomed(picture, 1.2) for picture in recorded[30:40])])
     assert (code, frame) == ("zoom-jump", 30) and "1.2" in what
