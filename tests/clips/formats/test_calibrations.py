@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from calibration_files import BENT, SHIFT, SIZE, TURN, kalibr, ros
 from public_layouts import K, stereo_yaml
-from raw_sources import ini
 
 from endotsr.clips.formats.calibrations import calibrated
 from endotsr.errors import InputError
@@ -112,12 +111,6 @@ def test_a_pair_of_ros_is_that_of_stereo_rectify(tmp_path):
 def test_a_matrix_as_text(text, tmp_path):
     (tmp_path / "K.txt").write_text(text)
     check_intrinsics(calibrated(tmp_path / "K.txt", *SIZE).intrinsics, ())
-
-
-def test_the_ini_of_stereomis_is_one_of_them(tmp_path):
-    (tmp_path / "a.ini").write_text(ini())
-    intrinsics, calibration = calibrated(tmp_path / "a.ini", 64, 48)[:2]
-    assert intrinsics is None and calibration.left.cx == 31.5 and calibration.translation.tolist() == [-4.0, 0.0, 0.0]
 
 
 FISH = {"distortion_model": "equidistant"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from endotsr.clips.opencv.filters import area_resize, canny_edges
-from endotsr.clips.opencv.flow import dense_flow, warp_bilinear, warp_cubic
+from endotsr.clips.opencv.flow import dense_flow, warp_cubic
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.opencv.regions import grown_by_disc
@@ -48,20 +48,6 @@ def test_hard_D6_canny_saturates_instead_of_wrapping():
     depth[3, 3] = np.nan
     assert canny_edges(depth).shape == depth.shape
     assert not canny_edges(np.full((20, 20), 40.9)).any()
-
-
-def test_warp_samples_where_the_flow_points():
-    image = RNG.random((3, 6, 8))
-    flow = np.zeros((2, 6, 8))
-    np.testing.assert_array_equal(warp_bilinear(image, flow), image)
-    flow[0], flow[1] = 1.25, -0.5
-    x, y = 3 + 1.25, 2 - 0.5
-    expected = 0.5 * (0.75 * image[:, 1, 4] + 0.25 * image[:, 1, 5]) + 0.5 * (
-        0.75 * image[:, 2, 4] + 0.25 * image[:, 2, 5]
-    )
-    assert (x, y) == (4.25, 1.5)
-    np.testing.assert_allclose(warp_bilinear(image, flow)[:, 2, 3], expected)
-    np.testing.assert_allclose(warp_bilinear(image, flow + 100)[:, 0, 0], image[:, 5, 7])
 
 
 def test_flow_finds_a_shift_in_both_axes_with_its_sign():

@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
-from depth_folders import WRONG, disparity, recording, true_depth
+from depth_folders import WRONG, recording
 from made_videos import files
 from raw_sources import colmap
 from stereo_pairs import slanted_pair
 
 from endotsr.cli.main import main
-from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.read import read_sequence
-from endotsr.config import PAPER, SequenceConfig
 
 
 @pytest.mark.parametrize("case", ["disparity in pixels", "stretched to 16 bits", "metres"])
@@ -22,22 +19,6 @@ def test_the_refusal_of_what_is_no_length_names_two_remedies(case, tmp_path, cap
     error = capsys.readouterr().err
     assert "--kind disparity" in error and "--trust-depth" in error
     assert main([*words, "--trust-depth"]) == 0
-
-
-def test_lengths_are_read(tmp_path):
-    words = recording(tmp_path, lambda i: true_depth(i) / 1000)
-    assert main([*words, "--depth-unit", "m"]) == 0
-    config = SequenceConfig(depth_percentiles=(0.0, 100.0))
-    sequence = read_sequence(tmp_path / "o", config, 0.2)
-    np.testing.assert_allclose(sequence.depth[3], true_depth(3), atol=0.02)
-    assert "depth-against-light" not in [found.code for found in check_sequence(tmp_path / "o", PAPER).findings]
-
-
-def test_check_names_depth_that_the_light_contradicts(tmp_path):
-    words = recording(tmp_path, lambda i: 4 * disparity(i))
-    assert main([*words, "--trust-depth"]) == 0
-    found = [found for found in check_sequence(tmp_path / "o", PAPER).findings if found.code == "depth-against-light"]
-    assert found and found[0].level == "warning"
 
 
 def test_the_parallax_of_a_pair_speaks_against_a_disparity(tmp_path, capsys):

@@ -14,7 +14,6 @@ from endotsr.results.evaluation import pictures
 from endotsr.results.evaluation.baselines import BASELINES, flow_interpolation
 from endotsr.results.evaluation.metrics import round_8bit
 from endotsr.results.evaluation.pictures import find_renders, measure_pictures, read_render
-from endotsr.results.evaluation.turned import turned_remark
 
 HELD_OUT = [1, 9]
 
@@ -154,23 +153,6 @@ def test_levels_of_8_bits_stored_in_16_are_refused(tmp_path):
         read_render(tmp_path / "a.png", (3, 32, 48))
     write_png(tmp_path / "b.png", np.zeros((32, 48, 3), np.uint16))
     assert not read_render(tmp_path / "b.png", (3, 32, 48)).any()
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda picture: picture[::-1], "with red and blue exchanged"),
-        (lambda picture: picture[:, ::-1], "upside down"),
-        (lambda picture: picture[:, :, ::-1], "mirrored"),
-        (lambda picture: picture[:, ::-1, ::-1], "turned by 180 degrees"),
-        (lambda picture: picture, ""),
-        (lambda picture: picture * 0 + picture.mean(), ""),
-    ],
-)
-def test_pictures_in_another_order_are_named(change, said, sequence):
-    """Channels in the order of OpenCV gave 12 dB without a word."""
-    remark = turned_remark(lambda i: np.ascontiguousarray(change(flow_interpolation(sequence, i))), sequence)
-    assert (said in remark and remark.startswith("warning: ")) if said else not remark
 
 
 def test_training_frames_are_measured_where_the_folder_holds_them(sequence, tmp_path):

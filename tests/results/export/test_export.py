@@ -100,20 +100,6 @@ def test_numbers_beyond_half_precision_stay_finite(tmp_path):
         ("a.ply", Times(times=(1.5,)), Content(), "export: --times 1.5 is not allowed"),
         ("a.ply", Times(), Content(least_opacity=2), "--opacity 2 is not allowed"),
         ("a.mp4", Times(), Content(), "a folder of ply files, but this is the name of a .mp4 file"),
-        (
-            "a.spz",
-            Times(),
-            Content(),
-            "the name of a .spz file; use FILE.ply (Gaussians, points or a mesh at",
-        ),
-        ("a.splat", Times(), Content(), "this is the name of a .splat file; use FILE.ply"),
-        ("a.obj", Times(), Content("mesh"), "this is the name of a .obj file; use FILE.ply"),
-        (
-            "a.gltf",
-            Times(),
-            Content("mesh"),
-            "FILE.html (a page), or a name without an ending",
-        ),
         ("no/a.ply", Times(), Content(), "cannot be written"),
     ],
 )

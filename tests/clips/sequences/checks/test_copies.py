@@ -89,21 +89,15 @@ def test_a_copy_that_returns_later_is_a_twin_too():
     assert len(set(picture_numbers(other, copied_frames(steps_between(other))).tolist())) == 2
 
 
-def test_a_reader_leaves_out_the_twin(tmp_path):
+@pytest.mark.parametrize(("source", "copy", "twin"), [(0, 1, 0), (1, 3, 3)])
+def test_a_reader_leaves_out_a_twin_also_one_that_returns_later(source, copy, twin, tmp_path):
     written(tmp_path / "clip")
-    write_png(tmp_path / "clip/images/000001.png", read_png(tmp_path / "clip/images/000000.png"))
+    write_png(tmp_path / f"clip/images/{copy:06d}.png", read_png(tmp_path / f"clip/images/{source:06d}.png"))
     found = read_sequence(tmp_path / "clip", PAPER.sequence)
-    assert found.test_index.tolist() == [1] and found.train_index.tolist() == [2, 3, 4]
-    assert any("held-out frames repeat them: 000000" in note for note in found.notes)
-
-
-def test_a_reader_leaves_out_a_twin_that_returns_later(tmp_path):
-    written(tmp_path / "clip")
-    write_png(tmp_path / "clip/images/000003.png", read_png(tmp_path / "clip/images/000001.png"))
-    found = read_sequence(tmp_path / "clip", PAPER.sequence)
-    assert found.test_index.tolist() == [1] and found.train_index.tolist() == [0, 2, 4]
-    assert any("held-out frames repeat them: 000003" in note for note in found.notes)
-    assert any("returning-frames: frame 3: 1 frame repeats" in note for note in found.notes)
+    assert found.test_index.tolist() == [1] and found.train_index.tolist() == [i for i in (0, 2, 3, 4) if i != twin]
+    assert any(f"held-out frames repeat them: {twin:06d}" in note for note in found.notes)
+    returns = any("returning-frames: frame 3: 1 frame repeats" in note for note in found.notes)
+    assert returns == (copy - source > 1)
 
 
 @pytest.mark.parametrize(("copied", "found"), [(0.4, True), (0.6, False)])

@@ -1,6 +1,7 @@
 """Depth with a scale of its own in each frame is named; tissue and scopes that move are not."""
 
 from dataclasses import replace
+from functools import cache
 
 import msgspec
 import numpy as np
@@ -8,14 +9,12 @@ import pytest
 from scipy.ndimage import zoom
 
 from data_folder import data_folder
-from endonerf_writer import write_endonerf
-from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.depth_steps import DepthStep, DepthSteps, loaded_steps, scale_finding
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
 from endotsr.clips.simulator.simulate import simulate
-from endotsr.config import PAPER, SequenceConfig, with_settings
+from endotsr.config import SequenceConfig, with_settings
 
 SIZE = {"width": 160, "height": 128, "frames": 16}
 
@@ -26,21 +25,19 @@ def scaled(sequence, spread: float, seed: int = 0):
     return replace(sequence, depth=sequence.depth * factors[:, None, None])
 
 
+@cache
+def scene(name):
+    return simulate(msgspec.structs.replace(named_scene(name), **SIZE)).sequence
+
+
 def codes(sequence) -> list[str]:
     return [found.code for found in loaded_steps(sequence).findings("depth")]
 
 
 @pytest.mark.parametrize("name", ["still", "breathing", "pulling", "cutting", "smoke", "moving-camera", "everything"])
 def test_a_scene_that_moves_has_one_scale(name):
-    sequence = simulate(msgspec.structs.replace(named_scene(name), **SIZE)).sequence
-    assert codes(sequence) == []
-    assert codes(scaled(sequence, 0.1)) == ["depth-own-scale"]
-
-
-def test_a_hand_held_scope_that_comes_near_has_one_scale():
-    settings = with_effects(SimulatorSettings(**SIZE), "camera_motion", "noise")
-    path = {"path": "hand", "amplitude": 12.0, "cycles": 2.0}
-    assert codes(simulate(with_settings(settings, camera_motion=path)).sequence) == []
+    assert codes(scene(name)) == []
+    assert codes(scaled(scene(name), 0.1)) == ["depth-own-scale"]
 
 
 @pytest.mark.parametrize("stride", [1, 2, 4])
@@ -68,10 +65,9 @@ def test_one_frame_of_another_scale_is_no_scale_of_every_frame():
 @pytest.mark.parametrize("factor, found", [(1.2, ["depth-scale-jump"]), (0.8, ["depth-scale-jump"]), (1.08, [])])
 def test_depth_in_parts_is_named_at_their_border(name, factor, found):
     """As of a network that computes the depth of a clip in parts."""
-    sequence = simulate(msgspec.structs.replace(named_scene(name), **SIZE)).sequence
-    depth = sequence.depth.copy()
+    depth = scene(name).depth.copy()
     depth[9:] *= factor
-    assert codes(replace(sequence, depth=depth)) == found
+    assert codes(replace(scene(name), depth=depth)) == found
 
 
 def test_a_jump_between_the_sampled_steps_is_found():
@@ -119,14 +115,6 @@ def test_steps_are_between_neighbours_and_at_most_48():
     for i in (0, 1, 3, 4):
         gap.add(i, picture, depth if i != 1 else None, None)
     assert len(gap.found) == 1  # from 3 to 4
-
-
-def test_check_and_training_both_name_it(tmp_path):
-    sequence = simulate(SimulatorSettings(**SIZE)).sequence
-    write_endonerf(scaled(sequence, 0.1), tmp_path / "clip")
-    assert "depth-own-scale" in [f.code for f in check_sequence(tmp_path / "clip", PAPER).findings]
-    notes = read_sequence(tmp_path / "clip", PAPER.sequence).notes
-    assert any(note.startswith("warning: depth-own-scale: from frame to frame the depth changes by") for note in notes)
 
 
 @pytest.mark.data

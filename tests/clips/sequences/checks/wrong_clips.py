@@ -121,6 +121,8 @@ WRONG = {
     "times 256": (lambda p: each(p, "depth", lambda x: (x * 256).astype(np.uint16)), "depth-unit", "warning", None),
     "micrometres": (lambda p: each(p, "depth", lambda x: (x * 1000).clip(0, 65535)), "depth-unit", "warning", None),
     "normalised": (lambda p: each(p, "depth", normalised), "normalised-depth", "warning", None),
+    "depth of another scale in each frame": (lambda p: [each(p, "depth", lambda x, i=i: rescaled(x, i), [i])
+                                                        for i in range(FRAMES)], "depth-own-scale", "warning", None),
     "constant depth": (lambda p: each(p, "depth", lambda x: (x > 0) * np.uint8(60)), "constant-depth", "refusal", None),
     "coarse depth": (lambda p: each(p, "depth", lambda x: (x // 10) * 10), "coarse-depth", "warning", None),
     "no depth at all": (lambda p: each(p, "depth", lambda x: x * 0), "no-depth", "refusal", None),
@@ -177,6 +179,12 @@ def upside_down(folder):
         red = (read_png(image) * np.array([1.0, 0.5, 0.5])).astype(np.uint8)
         write_png(image, np.where(excluded[..., None] > 0, np.uint8(120), red))
         write_png(mask, excluded[::-1])
+
+
+def rescaled(depth, i):
+    """Hundredths of a millimetre, times a factor of the frame."""
+    factor = np.exp(np.random.default_rng(i).normal(0, 0.1))
+    return (100.0 * depth * factor).astype(np.uint16)
 
 
 def sloped(depth):
