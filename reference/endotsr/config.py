@@ -21,6 +21,7 @@ from endotsr.untrusted.sections import (
     Section,
     SectionType,
     checked,
+    choice,
     refuse_unknown_keys,
 )
 from endotsr.untrusted.toml import read_toml, toml_text
@@ -400,7 +401,7 @@ def config_from_dict(data: Keys, where: str = "configuration") -> Config:
     """A strict `Config` from nested dictionaries over the preset named in data["preset"] (default `paper`)."""
     preset = data.get("preset", "paper")
     if not isinstance(preset, str) or preset not in PRESETS:
-        raise InputError(f"{where}: preset = {preset!r} is not allowed; use one of {', '.join(PRESETS)}")
+        raise InputError(f"{where}: preset = {preset!r} is not allowed; use {choice(PRESETS)}")
     data = without_former_keys(data, where, PRESETS[preset].training.bridge_fraction)
     refuse_unknown_keys(data, Config, where)
     return checked(merged(msgspec.to_builtins(PRESETS[preset]), data), Config, where)

@@ -118,7 +118,7 @@ def test_a_film_in_slow_motion(run_copy, tmp_path, capsys):
             "film.mp4: --out is a folder of pictures, but this is the name of a .mp4 file; --film",
         ),
         (["--out", "{}/a.png"], "the name of a .png file"),
-        (["--film", "{}/a.avi"], "a.avi: not a film; use a name that ends in .mp4, .webm, .gif"),
+        (["--film", "{}/a.avi"], "a.avi: not a film; use a name that ends in one of .mp4, .webm, .gif"),
         (["--film", "{}/none/a.mp4"], "a.mp4: cannot be written"),
         (["--film", "{}/a.mp4", "--rate", "0"], "--rate 0 is not allowed"),
         (["--film", "{}/a.mp4", "--panels"], "--panels: missing value {render,truth,error,depth,opacity} ..."),

@@ -55,5 +55,5 @@ def test_some_chapters_are_timed_and_the_others_keep_their_times(monkeypatch, tm
     found = measured("02")["chapters"]
     assert found == stored | {"02_b": found["02_b"]} and "01_a" not in found
     assert set(measured()["chapters"]) == {"01_a", "02_b"}
-    with pytest.raises(InputError, match=r"no notebook .*03.*; use one of 01, 02"):
+    with pytest.raises(InputError, match=r"no notebook .*03.*; use 01 or 02"):
         measured("03")

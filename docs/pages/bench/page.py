@@ -21,6 +21,7 @@ from endotsr.studies.bench.case import BenchCase, Precision, apart
 from endotsr.studies.bench.stages import Say
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import dated
+from endotsr.untrusted.sections import choice
 from pages.bench import charts, parts, peers, scaling, start
 from pages.bench import effects as bench_effects
 from pages.store.commands import loaded
@@ -64,7 +65,7 @@ def run_all(out: Path, names: tuple[str, ...], scenes: tuple[Path, ...], say: Sa
     Raises: InputError before anything is measured, if a name is unknown or a file of `scenes` is no trained scene.
     """
     if unknown := [name for name in names if name not in FILES]:
-        raise InputError(f"bench: {unknown[0]!r} is not allowed; use one of {', '.join(FILES)}")
+        raise InputError(f"bench: {unknown[0]!r} is not allowed; use {choice(FILES)}")
     for path in scenes:
         read_arrays(path)
     out.mkdir(parents=True, exist_ok=True)

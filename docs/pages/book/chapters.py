@@ -16,6 +16,7 @@ import time
 from typing import Any, NamedTuple
 
 from endotsr.errors import InputError
+from endotsr.untrusted.sections import choice
 from pages.store.commands import loaded
 from pages.store.program import DOCS, Program
 from pages.store.tables import noted, where_and_cores
@@ -77,7 +78,7 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
     numbers = options.numbers
     files = {file.name[:2]: file for file in sorted(NOTEBOOKS.glob("[0-9]*.py"))}
     if not {*numbers} <= {*files}:
-        raise InputError(f"no notebook {sorted({*numbers} - {*files})}; use one of {', '.join(files)}")
+        raise InputError(f"no notebook {sorted({*numbers} - {*files})}; use {choice(files)}")
     environment = os.environ | {"ENDOTSR_NOTEBOOK_SIZE": "small", "MPLBACKEND": "Agg", "NUMBA_NUM_THREADS": "1"}
     found = loaded(options.record)["chapters"] if numbers else {}
     for file in (files[number] for number in numbers or files):

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.errors import InputError
+from endotsr.untrusted.sections import choice
 from endotsr.untrusted.writing import replace_file
 from pages.book.figure_table import FIGURES, Figure, Formula, Setting
 from pages.store.marks import read_json
@@ -98,7 +99,7 @@ def _has(entry: Any, values: str) -> bool:
 def text(key: str) -> str:
     """A figure as text. Raises: InputError for an unknown name."""
     if key not in FIGURES:
-        raise InputError(f"docs/pages/book/figure_table.py: no figure {key!r}; use one of {', '.join(FIGURES)}")
+        raise InputError(f"docs/pages/book/figure_table.py: no figure {key!r}; use {choice(FIGURES)}")
     return FIGURES[key].form.format(value(FIGURES[key]))
 
 

@@ -23,6 +23,7 @@ from endotsr.errors import InputError
 from endotsr.results.report.style import save
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import dated, now
+from endotsr.untrusted.sections import choice
 from pages.effects import parts as effects_parts
 from pages.effects import study
 from pages.effects import truth as effects_truth
@@ -67,7 +68,7 @@ def train(options: argparse.Namespace) -> dict[str, Any]:
     folders = {Path(name).name: Path(name) for name in options.names if Path(name).is_dir()}
     scenes = [name for name in options.names if Path(name).name not in folders] or list(SCENES)
     if unknown := [name for name in scenes if name not in SCENES]:
-        raise InputError(f"scene {unknown[0]!r} is not allowed; use one of {', '.join(SCENES)}, or a folder")
+        raise InputError(f"scene {unknown[0]!r} is not allowed; use {choice(SCENES)}, or a folder")
     runs = [(name, seed) for seed in range(options.seeds) for name in (*scenes, *folders)]
     ready: list[bool] = []
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
+from endotsr.untrusted.sections import choice
 from pages.live.bundle import CHAPTERS, cells, files, formulas
 from pages.live.supply import supply
 from pages.store.commands import loaded
@@ -90,7 +91,7 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
     """
     chapters = options.chapters
     if wrong := sorted({*chapters} - {*CHAPTERS}):
-        raise InputError(f"{', '.join(wrong)}: runs in no page; use one of {', '.join(CHAPTERS)}")
+        raise InputError(f"{', '.join(wrong)}: runs in no page; use {choice(CHAPTERS)}")
     found = loaded(options.record)["chapters"] if chapters else {}
     for name in chapters or CHAPTERS:
         with tempfile.TemporaryDirectory() as scratch:

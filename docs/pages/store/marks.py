@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
+from endotsr.untrusted.sections import choice
 from endotsr.untrusted.writing import replace_file
 
 
@@ -28,7 +29,7 @@ def replaced(text: str, made: Mapping[str, str], page: Path, room: str) -> str:
         head, rest = text.split(f"<!-- {room}:{name}:start -->", 1)
         _, end, tail = rest.partition(f"<!-- {room}:{name}:end -->")
         if not end or name not in made:
-            raise InputError(f"{page}: mark {room}:{name} has no end or no meaning; use one of {', '.join(made)}")
+            raise InputError(f"{page}: mark {room}:{name} has no end or no meaning; use {choice(made)}")
         lines = f"{made[name]}\n{end}"
         if page.suffix == ".py":  # a cell of text of a notebook
             lines = "\n".join(f"# {line}".rstrip() for line in lines.splitlines())

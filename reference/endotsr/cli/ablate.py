@@ -11,6 +11,7 @@ from endotsr.cli.sweep import ended, run_spec
 from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
 from endotsr.untrusted.json import Keys
+from endotsr.untrusted.sections import choice
 
 if TYPE_CHECKING:
     from endotsr.studies.sweeps.ablation_page import AblationRecord
@@ -118,9 +119,7 @@ def spec_data(options: AblateOptions) -> Keys:
         raise InputError(f"ablate: --seeds {options.seeds} is not allowed; use an integer >= 1")
     for name in options.configurations:
         if name not in CONFIGURATIONS:
-            raise InputError(
-                f"ablate: --configurations {name!r} is not allowed; use one of {', '.join(CONFIGURATIONS)}"
-            )
+            raise InputError(f"ablate: --configurations {name!r} is not allowed; use {choice(CONFIGURATIONS)}")
     length = PRESETS[options.preset].training.iterations if options.iterations is None else options.iterations
     if length < 2:
         raise InputError(f"ablate: --iterations {length} is not allowed; use an integer >= 2")

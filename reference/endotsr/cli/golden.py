@@ -11,6 +11,7 @@ from endotsr.cli.parts.parser import HELP, parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.untrusted.names import counted
+from endotsr.untrusted.sections import choice
 
 Outdir = Annotated[Path, Option("OUTDIR", positional=True)]
 Level = Literal[0, 1, 2, 3, 4, 5]
@@ -115,7 +116,7 @@ def run(words: list[str]) -> int:
         print("\n`endotsr golden SUBCOMMAND --help` lists the options of a subcommand.")
         return 0
     if words[0] not in SUBCOMMANDS:
-        raise InputError(f"unknown subcommand golden {words[0]!r}; use one of {', '.join(SUBCOMMANDS)}")
+        raise InputError(f"unknown subcommand golden {words[0]!r}; use {choice(SUBCOMMANDS)}")
     return globals()[f"_{words[0]}"](words[1:])
 
 

@@ -16,6 +16,7 @@ from endotsr.cli.parts.output import redirected, split_output
 from endotsr.errors import CalibrationError, InputError
 from endotsr.training.runs.stopping import INTERRUPTED, signals_stop
 from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.sections import choice
 
 # Read when NumPy is loaded. Several threads call BLAS at the same time, whose calls would wait for one another actively
 # if each had threads of its own; `--threads 1` would not hold either.
@@ -145,7 +146,7 @@ def _command(name: str):
         import difflib
 
         meant = "".join(f"did you mean {word}? " for word in difflib.get_close_matches(name, COMMANDS, n=1))
-        raise InputError(f"unknown command {name!r}; {meant}use one of {', '.join(COMMANDS)}")
+        raise InputError(f"unknown command {name!r}; {meant}use {choice(COMMANDS)}")
     return importlib.import_module(f"endotsr.cli.{name}").run
 
 
@@ -155,7 +156,7 @@ def _completion(words: list[str]) -> str:
 
     shell = "".join([words[0].partition("=")[2], *words[1:]])
     if shell not in SCRIPTS:
-        raise InputError(f"--completion {shell!r} is not allowed; use one of {', '.join(SCRIPTS)}")
+        raise InputError(f"--completion {shell!r} is not allowed; use {choice(SCRIPTS)}")
     return SCRIPTS[shell]()
 
 

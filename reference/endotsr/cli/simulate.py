@@ -18,6 +18,7 @@ from endotsr.errors import InputError
 from endotsr.training.runs.files import os_error_line
 from endotsr.training.runs.folder import refuse_existing
 from endotsr.untrusted.names import counted
+from endotsr.untrusted.sections import choice
 from endotsr.untrusted.writing import replacing_folder
 
 STILL = named_scene("still")
@@ -54,7 +55,7 @@ def run(words: list[str]) -> int:
     if options.out is None:
         raise InputError("simulate: --out FOLDER is missing: the sequence folder to create")
     if not options.scene and options.effects is None:
-        raise InputError(f"simulate: SCENE is missing; use one of {', '.join(SCENES)}, or --effects NAME,..")
+        raise InputError(f"simulate: SCENE is missing; use {choice(SCENES)}, or --effects NAME,..")
     base = named_scene(options.scene) if options.scene else STILL
     base = base if options.effects is None else scene_of(options.effects)
     settings = parse(SimulateOptions, words, "simulate", SimulateOptions(settings=base)).settings

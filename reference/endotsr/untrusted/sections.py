@@ -58,7 +58,7 @@ def unknown_key(key: str, allowed: Iterable[str], prefix: str = "") -> str:
     """What is wrong with an unknown key: the allowed ones, and at the end the one that is spelled most like it."""
     listed = list(allowed)
     meant = "".join(f"; did you mean {name}?" for name in difflib.get_close_matches(key, listed, n=1))
-    return f"unknown key {prefix}{key}; use one of {', '.join(listed)}{meant}"
+    return f"unknown key {prefix}{key}; use {choice(listed)}{meant}"
 
 
 def is_section(kind: Any) -> bool:

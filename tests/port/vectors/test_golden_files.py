@@ -315,5 +315,5 @@ def test_the_reference_answers_by_two_paths(golden, operation):
         reference(all_operations()[operation], inputs, case.settings, "float32", p) for p in ("definition", "blocks")
     ]
     assert any(answers[0][name].tobytes() != answers[1][name].tobytes() for name in answers[0])
-    with pytest.raises(ValueError, match="'rows' is not known; use one of definition, blocks"):
+    with pytest.raises(ValueError, match="'rows' is not known; use definition or blocks"):
         reference(all_operations()[operation], inputs, case.settings, "float32", "rows")

@@ -66,7 +66,7 @@ def test_a_film_without_a_picture_is_refused_and_leaves_nothing(ending, tmp_path
 
 @pytest.mark.parametrize(
     ("name", "rate", "said"),
-    [("a.avi", 10, "use a name that ends in .mp4"), ("a", 10, "not a film"), ("a.mp4", 0, "--rate 0"),
+    [("a.avi", 10, "use a name that ends in one of .mp4"), ("a", 10, "not a film"), ("a.mp4", 0, "--rate 0"),
      ("a.gif", 60, "0.1 to 50"), ("a.mp4", float("nan"), "--rate nan")],
 )  # fmt: skip
 def test_names_and_rates_that_no_film_has_are_refused(name, rate, said, tmp_path):

@@ -8,6 +8,7 @@ from endotsr.errors import InputError
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.folder import RunFolder
 from endotsr.untrusted.names import counted
+from endotsr.untrusted.sections import choice
 
 # Settings that affect equation (7).
 REPLACEABLE = (
@@ -53,5 +54,5 @@ def _refuse_fixed(replaced: list[str], run_path: Path) -> None:
     fixed = [line for line in replaced if not line.split(" = ")[0].startswith(REPLACEABLE)]
     if fixed:
         raise InputError(
-            f"--calibrate-only: {', '.join(fixed)}: fixed by the run {run_path}; use one of {', '.join(REPLACEABLE)}"
+            f"--calibrate-only: {', '.join(fixed)}: fixed by the run {run_path}; use {choice(REPLACEABLE)}"
         )

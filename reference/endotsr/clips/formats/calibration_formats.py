@@ -20,6 +20,7 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_text
 from endotsr.untrusted.json import Keys
 from endotsr.untrusted.names import decimal_commas, plain_line
+from endotsr.untrusted.sections import choice
 from endotsr.untrusted.yaml import matrix, read_yaml
 
 HALF_A_PIXEL = "its pixel centres are at integers, as in OpenCV: half a pixel was added to cx and cy"
@@ -201,7 +202,7 @@ def _kalibr_camera(path: Path, keys: Keys, name: str) -> StoredIntrinsics:
     where = f"{path}: {name}"
     for key, allowed in KALIBR_MODELS.items():
         if keys.get(key, allowed[0]) not in allowed:
-            raise InputError(f"{where}: {key} {keys[key]!r} is not allowed; use one of {', '.join(allowed)}")
+            raise InputError(f"{where}: {key} {keys[key]!r} is not allowed; use {choice(allowed)}")
     fx, fy, cx, cy = matrix(keys.get("intrinsics"), f"{where}: intrinsics", (4,))
     given = matrix(keys.get("distortion_coeffs", [0.0] * 4), f"{where}: distortion_coeffs", (-1,))
     width, height = matrix(keys.get("resolution"), f"{where}: resolution", (2,))
@@ -263,7 +264,7 @@ def _ros_keys(keys: Keys, path: Path) -> tuple[Keys, list[str]]:
 def _ros_camera(path: Path, keys: Keys) -> StoredIntrinsics:
     model = keys.get("distortion_model", ROS_MODELS[0])
     if model not in ROS_MODELS:
-        raise InputError(f"{path}: distortion_model {model!r} is not allowed; use one of {', '.join(ROS_MODELS)}")
+        raise InputError(f"{path}: distortion_model {model!r} is not allowed; use {choice(ROS_MODELS)}")
     size = keys.get("image_width"), keys.get("image_height")
     if not all(isinstance(side, int) and side > 0 for side in size):
         raise InputError(f"{path}: image_width and image_height: use whole numbers > 0")

@@ -12,6 +12,7 @@ from endotsr.clips.formats.files import shortened
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.errors import InputError
 from endotsr.untrusted.names import counted, relative_path
+from endotsr.untrusted.sections import choice
 
 # Folders with models, or with numbered folders of models; the first that has one counts.
 PLACES = (".", "sparse", "colmap/sparse", "dense", "distorted/sparse")
@@ -58,7 +59,7 @@ def choose_model(path: Path, name: str = "") -> ChosenModel:
         wanted = name.replace("\\", "/").strip("/")
         found = next((folder for folder in models if wanted in (names[folder], folder.name)), None)
         if found is None:
-            raise InputError(f"{path}: --model {name}: no such model; use one of {', '.join(names.values())}")
+            raise InputError(f"{path}: --model {name}: no such model; use {choice(names.values())}")
     else:
         found = max(models, key=lambda folder: counts[folder])
     others = [f"{names[folder]} ({counted(counts[folder], 'picture')})" for folder in models if folder != found]

@@ -17,6 +17,7 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_bytes, read_text
 from endotsr.untrusted.names import counted
+from endotsr.untrusted.sections import choice
 
 LARGEST_FILE = 1 << 31  # bytes of images.bin: 24 for an observation, enough for more than eighty million
 
@@ -79,7 +80,7 @@ def read_model(folder: Path) -> ColmapModel:
 
 def _intrinsics(name: str, width: int, height: int, values: list[float], where: str) -> Intrinsics:
     if name not in MODELS:
-        raise InputError(f"{where}: camera model {name}: use one of {', '.join(MODELS)}")
+        raise InputError(f"{where}: camera model {name}: use {choice(MODELS)}")
     if len(values) != PARAMETERS[name]:
         raise InputError(f"{where}: {len(values)} parameters; {name} has {PARAMETERS[name]}")
     _, (fx, fy, cx, cy), places = MODELS[name]
@@ -224,7 +225,7 @@ def _cameras_binary(path: Path) -> dict[int, Intrinsics]:
         key, model, width, height = stream.take("iiQQ")
         where = f"{path}: camera {key}"
         if model not in NUMBERS:
-            raise InputError(f"{where}: camera model number {model}: use one of {', '.join(MODELS)}")
+            raise InputError(f"{where}: camera model number {model}: use {choice(MODELS)}")
         values = list(stream.take(f"{PARAMETERS[NUMBERS[model]]}d"))
         found[key] = _intrinsics(NUMBERS[model], width, height, values, where)
     stream.end()

@@ -20,6 +20,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.json import Keys
 from endotsr.untrusted.matlab import read_mat
+from endotsr.untrusted.sections import choice
 from endotsr.untrusted.yaml import matrix
 
 OF_CALIBRATION = "it documents the calibration"
@@ -142,7 +143,7 @@ def _camera(keys: Any, where: str) -> tuple[StoredIntrinsics, list[str], float]:
     bent = distortion_of(np.array([*radial[:2], *across, *radial[2:]]), f"{where}: distortion")
     unit = str(keys.get("WorldUnits", "mm")).lower()
     if unit not in UNITS:
-        raise InputError(f"{where}: WorldUnits {unit[:40]!r}; use one of {', '.join(UNITS)}")
+        raise InputError(f"{where}: WorldUnits {unit[:40]!r}; use {choice(UNITS)}")
     stated = keys.get("ImageSize")
     size = None if stated is None or not np.size(stated) else matrix(stated, f"{where}: ImageSize", (2,)).astype(int)
     return StoredIntrinsics(found, bent, None if size is None else (int(size[1]), int(size[0]))), notes, UNITS[unit]

@@ -17,6 +17,7 @@ from endotsr.clips.formats.calibration_formats import (
 from endotsr.clips.formats.inventory import Inventory
 from endotsr.errors import InputError
 from endotsr.untrusted.json import Keys, number
+from endotsr.untrusted.sections import choice
 from endotsr.untrusted.yaml import matrix
 
 ORB = Inventory(
@@ -93,7 +94,7 @@ def read_euroc(path: Path, keys: Keys) -> StoredCalibration | None:
     notes = EUROC.noted(keys, path)
     for key, allowed in EUROC_MODELS.items():
         if keys.get(key, allowed[0]) not in allowed:
-            raise InputError(f"{path}: {key} {keys[key]!r}; use one of {', '.join(allowed)}")
+            raise InputError(f"{path}: {key} {keys[key]!r}; use {choice(allowed)}")
     fx, fy, cx, cy = matrix(keys["intrinsics"], f"{path}: intrinsics", (4,)).tolist()
     width, height = matrix(keys["resolution"], f"{path}: resolution", (2,)).tolist()
     given = matrix(keys.get("distortion_coefficients", [0.0] * 4), f"{path}: distortion_coefficients", (-1,))

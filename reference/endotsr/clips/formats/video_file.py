@@ -23,6 +23,7 @@ from endotsr.clips.formats.view_marks import ViewMarks, view_marks
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS, open_regular
 from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.sections import choice
 
 LARGEST_FILE = 1 << 40  # bytes; a video is decoded picture by picture
 # First bytes of the containers. The extension is not sufficient: a decoder would follow a play list.
@@ -327,7 +328,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
     with open_regular(path, LARGEST_FILE) as file:
         begin = file.read(16)
         if not any(begin.startswith(starts, place) for place, starts in STARTS.items()):
-            raise InputError(f"{path}: not a video by its first bytes; use one of {', '.join(VIDEO_ENDINGS)}")
+            raise InputError(f"{path}: not a video by its first bytes; use {choice(VIDEO_ENDINGS)}")
         file.seek(0)
         try:
             options: Any = _metadata_ignored(av.__version__)

@@ -25,6 +25,7 @@ from endotsr.untrusted.files import MOST_PIXELS, read_bytes
 from endotsr.untrusted.first_bytes import FIRST_BYTES, true_name
 from endotsr.untrusted.names import counted, plain_line
 from endotsr.untrusted.png import LARGEST_FILE
+from endotsr.untrusted.sections import choice
 
 JPEG_ENDINGS = (".jpg", ".jpeg")
 TIFF_ENDINGS = (".tif", ".tiff")
@@ -54,7 +55,7 @@ def read_picture(path: Path) -> Array:
         _check_turn(marks_of(data).get("Orientation") or 1, path)
         return pixels
     if ending not in KINDS:
-        raise InputError(f"{path}: no picture by its name; use a name that ends in one of {', '.join(PICTURE_ENDINGS)}")
+        raise InputError(f"{path}: no picture by its name; use a name that ends in {choice(PICTURE_ENDINGS)}")
     data = read_bytes(Path(path), LARGEST_FILE)
     kind = _check_start_and_end(data, ending, path)
     pixels = _by_pillow(data, kind, path)

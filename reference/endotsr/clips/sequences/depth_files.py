@@ -15,6 +15,7 @@ from endotsr.clips.sequences.clip import grey_plane
 from endotsr.clips.sequences.sampling import sparse_step
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
+from endotsr.untrusted.sections import choice
 
 CLIPPED = SequenceConfig().depth_percentiles  # depth is clipped to these before resizing
 ANOTHER_SCALE = 64.0  # times the usual median depth; 8 bits stretched to 16 give 256
@@ -48,7 +49,7 @@ def read_plane(path: Path) -> NDArray:
     if (why := FILES.reason(FILES.refused, ending)) is not None:
         raise InputError(f"{path}: {why}")
     if ending not in DEPTH_ENDINGS:
-        raise InputError(f"{path}: no depth by its name; use a name that ends in one of {', '.join(FILES.listed)}")
+        raise InputError(f"{path}: no depth by its name; use a name that ends in {choice(FILES.listed)}")
     points = read_points(path)
     if points is not None:
         return np.ascontiguousarray(points[:, :, 2])

@@ -30,6 +30,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.json import read_json, text
+from endotsr.untrusted.sections import choice
 
 PROPOSAL = "proposal.json"  # next to a folder of masks that a program proposed
 MASK_ENDINGS = (*PICTURE_ENDINGS, *ARRAY_ENDINGS)
@@ -40,7 +41,7 @@ def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
     """The file itself, or the files of a folder in time order. Raises InputError."""
     if path.is_file():
         if path.suffix.lower() not in endings:
-            raise InputError(f"{path}: use a file that ends in {', '.join(endings)}, or a folder of such files")
+            raise InputError(f"{path}: use a file that ends in {choice(endings)}, or a folder of such files")
         return [path]
     return list_pictures(path, endings)
 

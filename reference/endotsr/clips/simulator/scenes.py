@@ -8,6 +8,7 @@ import msgspec
 
 from endotsr.clips.simulator.settings import EFFECTS, SimulatorSettings, with_effects
 from endotsr.errors import InputError
+from endotsr.untrusted.sections import choice
 
 SIZE = SimulatorSettings(width=640, height=512, frames=63)
 IN_FILES = ("stereo", "depth_rounding")  # on in every scene: required by a sequence folder
@@ -28,7 +29,7 @@ SCENES: dict[str, tuple[str, ...]] = {
 def named_scene(name: str) -> SimulatorSettings:
     """The settings of a scene. Raises InputError for a name that is not in SCENES."""
     if name not in SCENES:
-        raise InputError(f"scene {name!r} is not allowed; use one of {', '.join(SCENES)}")
+        raise InputError(f"scene {name!r} is not allowed; use {choice(SCENES)}")
     return with_effects(SIZE, *SCENES[name], *IN_FILES)
 
 

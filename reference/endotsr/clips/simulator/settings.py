@@ -11,7 +11,7 @@ import msgspec
 from endotsr.clips.simulator import sections
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS
-from endotsr.untrusted.sections import Count, NonNegative, Positive, Section
+from endotsr.untrusted.sections import Count, NonNegative, Positive, Section, choice
 
 Side = Annotated[int, msgspec.Meta(ge=16)]
 FrameCount = Annotated[int, msgspec.Meta(ge=3)]
@@ -85,6 +85,6 @@ def with_effects(settings: SimulatorSettings, *names: str) -> SimulatorSettings:
     """
     unknown = set(names) - set(EFFECTS)
     if unknown:
-        raise InputError(f"effects: unknown: {', '.join(sorted(unknown))}; use one of {', '.join(EFFECTS)}")
+        raise InputError(f"effects: unknown: {', '.join(sorted(unknown))}; use {choice(EFFECTS)}")
     switched = {name: msgspec.structs.replace(getattr(settings, name), on=name in names) for name in EFFECTS}
     return msgspec.structs.replace(settings, **switched)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.training.runs.files import refuse_unwritable
+from endotsr.untrusted.sections import choice
 
 
 def run_gradcheck(
@@ -27,7 +28,7 @@ def run_gradcheck(
     pairs = definition_pairs() if definition else all_pairs()
     for name in names or ():
         if name not in pairs:
-            raise InputError(f"gradcheck: {name!r} is not a registered stage; use one of {', '.join(pairs)}")
+            raise InputError(f"gradcheck: {name!r} is not a registered stage; use {choice(pairs)}")
     refuse_unwritable(json_path)
     chosen = [pairs[name] for name in (names or pairs)]
     reports, precisions = [], []

@@ -21,6 +21,7 @@ from endotsr.port.judge.format import MOST_RUNS, Level, Precision, _Strict, read
 from endotsr.port.judge.profiles import PROFILES, WITHOUT, ProfileClaim, claim_text
 from endotsr.port.judge.records import Report
 from endotsr.port.judge.store import Golden
+from endotsr.untrusted.sections import choice
 from endotsr.untrusted.writing import replace_text
 
 LONGEST = 500  # characters of a text
@@ -96,7 +97,7 @@ class Certificate(_Strict, frozen=True, kw_only=True):
             if len(text) > LONGEST or any(unicodedata.category(letter) in INVISIBLE for letter in text):
                 raise InputError(f"a text is longer than {LONGEST} characters or has control characters")
         if (self.profile and self.profile not in PROFILES) or any(one.profile not in PROFILES for one in self.right):
-            raise InputError(f"profile: unknown; use one of {', '.join(PROFILES)}")
+            raise InputError(f"profile: unknown; use {choice(PROFILES)}")
         if len(self.without) > MOST_OPERATIONS or min(self.cases, self.outputs, self.machine.cores) < 1:
             raise InputError(
                 f"without, cases, outputs, cores: more than {MOST_OPERATIONS} operations, or a count below 1"

@@ -12,6 +12,7 @@ import msgspec
 from endotsr.errors import InputError
 from endotsr.port.judge.format import LEVELS, Case
 from endotsr.port.judge.store import Golden
+from endotsr.untrusted.sections import choice
 
 REVERSE = "d_"  # the names of the outputs of a reverse pass begin with it
 WITHOUT = ", without "  # before what a claim leaves out
@@ -95,7 +96,7 @@ class Graded(NamedTuple):
 def last_level(profile: str) -> int:
     """The highest level of a profile. Raises: InputError for an unknown one."""
     if profile not in PROFILES:
-        raise InputError(f"--profile {profile[:40]!a}: no such profile; use one of {', '.join(PROFILES)}")
+        raise InputError(f"--profile {profile[:40]!a}: no such profile; use {choice(PROFILES)}")
     return max(PROFILES[profile].says)
 
 

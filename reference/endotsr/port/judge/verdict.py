@@ -24,6 +24,7 @@ from endotsr.port.judge.recognise import merged, pair_of, suspects_of
 from endotsr.port.judge.records import CaseReport, Report
 from endotsr.port.judge.second_run import not_repeated, repeated
 from endotsr.port.judge.store import Golden
+from endotsr.untrusted.sections import choice
 
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations omitted by the port, one per line
 INSIDE = "inside"  # in that file: the port cannot write arrays inside its operations
@@ -95,9 +96,7 @@ def only_of(golden: Golden, only: str) -> Golden:
     """The cases of one family, or one family/case. Raises InputError if there is none."""
     cases = [case for case in golden.cases if only in ("", case.family, case.name)]
     if not cases:
-        raise InputError(
-            f"--only {only[:60]!a}: no such case; use one of {', '.join(golden.manifest.families)}, or FAMILY/CASE"
-        )
+        raise InputError(f"--only {only[:60]!a}: no such case; use {choice(golden.manifest.families)}, or FAMILY/CASE")
     return golden._replace(cases=cases)
 
 

@@ -19,6 +19,7 @@ from endotsr.method.splatting.settings import LegacyDeviations, RasterSettings
 from endotsr.port.stages.stage import Inputs, Settings
 from endotsr.training.fitting.model import Spectral, spectral_from
 from endotsr.training.scene.gaussians import Gaussians
+from endotsr.untrusted.sections import choice
 
 COMPOSITORS: tuple[Compositor, ...] = ("definition", "blocks")
 
@@ -48,7 +49,7 @@ def compositor_of(settings: Settings) -> Compositor:
     """
     asked = settings.get("_compositor", "definition")
     if asked not in COMPOSITORS:
-        raise ValueError(f"_compositor: {asked!r} is not known; use one of {', '.join(COMPOSITORS)}")
+        raise ValueError(f"_compositor: {asked!r} is not known; use {choice(COMPOSITORS)}")
     return "blocks" if asked == "blocks" and compositing_blocks.supports(raster_of(settings)) else "definition"
 
 

@@ -34,6 +34,7 @@ from endotsr.results.evaluation.records import Measured, MeasureRow
 from endotsr.results.evaluation.right_view import right_view
 from endotsr.training.fitting.model import render_at, with_corrected_cameras
 from endotsr.training.runs.model import Model
+from endotsr.untrusted.sections import choice
 
 STATIC = 0.5  # px between successive frames: largest median flow of a static pixel
 STATIC_HIGH = 1.0  # px: largest 90th percentile of the flow
@@ -67,7 +68,7 @@ def check_measures(names: Iterable[str], what: str = "measure") -> None:
     """Raises InputError for an unknown name; the message begins with `what`."""
     for name in names:
         if name not in MEASURES:
-            raise InputError(f"{what} {name!r} is not allowed; use one of {', '.join(MEASURES)}")
+            raise InputError(f"{what} {name!r} is not allowed; use {choice(MEASURES)}")
 
 
 def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str) -> dict[str, Measured]:

@@ -23,6 +23,7 @@ from endotsr.training.fitting.model import corrected_cameras, render_at, scene_a
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.training.runs.model import Model, load_model
 from endotsr.training.scene.gaussians import Gaussians
+from endotsr.untrusted.sections import choice
 
 FOCAL = 1.2  # focal length of the facing camera, picture widths
 MARGIN = 1.1  # width of its picture relative to the extent of the Gaussians
@@ -75,7 +76,7 @@ class MovingScene:
             raise InputError(f"render: time = {time!r} is not allowed; use a number in [0, 1]")
         for name in taken_out:
             if name not in COMPONENTS:
-                raise InputError(f"render: without = {name!r} is not allowed; use one of {', '.join(COMPONENTS)}")
+                raise InputError(f"render: without = {name!r} is not allowed; use {choice(COMPONENTS)}")
         if not isinstance(camera, Camera):
             frame, last = nearest_frame(self.record.times, time) if camera is None else camera, self.record.count - 1
             if not isinstance(frame, Integral) or not 0 <= int(frame) <= last:

@@ -15,6 +15,7 @@ from endotsr.clips.sequences.record import UNKNOWN_RATE
 from endotsr.errors import InputError
 from endotsr.results.report.figures import ByteImage
 from endotsr.untrusted.marks import FILM
+from endotsr.untrusted.sections import choice
 from endotsr.untrusted.writing import replace_file
 
 KINDS = (".mp4", ".webm", ".gif")
@@ -27,7 +28,7 @@ HUNDREDTHS = 100  # units of time per second in a gif
 def check_film(file: Path, rate: float | None = None, slow: float | None = None) -> None:
     """Raises InputError for a wrong extension, an invalid rate or slow-down, or a missing encoder."""
     if file.suffix.lower() not in KINDS:
-        raise InputError(f"{file}: not a film; use a name that ends in {', '.join(KINDS)}")
+        raise InputError(f"{file}: not a film; use a name that ends in {choice(KINDS)}")
     if rate is not None and slow is not None:
         raise InputError("render: --rate with --slow: both set the speed of the film; use one of them")
     highest = _highest(file)

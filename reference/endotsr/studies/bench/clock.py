@@ -15,6 +15,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from endotsr.studies.bench.records import Spread
+from endotsr.untrusted.sections import choice
 
 REST = "rest"
 SPLAT = ("projection", "binning", "blend forward", "blend reverse")
@@ -56,7 +57,7 @@ class StageClock:
     def stage(self, name: str) -> Iterator[None]:
         """Assign the time of the block to the stage `name`. Raises: KeyError for an unknown stage."""
         if name not in STAGES:
-            raise KeyError(f"unknown stage {name!r}; use one of {', '.join(STAGES)}")
+            raise KeyError(f"unknown stage {name!r}; use {choice(STAGES)}")
         thread = threading.get_ident()
         with self._lock:
             self._charge()

@@ -14,6 +14,7 @@ from endotsr.untrusted import json as json_files
 from endotsr.untrusted.json import Keys
 from endotsr.untrusted.marks import refuse_foreign
 from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.sections import choice
 from endotsr.untrusted.writing import replace_text
 
 OF_A_RUN = frozenset(
@@ -137,9 +138,7 @@ def _refuse_other_kind(option: str, file: Path) -> None:
     """Raises InputError for the ending of another kind of file; one that names no kind, such as `.txt`, is allowed."""
     own, ending = ENDINGS.get(option, ()), file.suffix.lower()
     if own and ending in KNOWN_ENDINGS and ending not in own:
-        raise InputError(
-            f"{option} {file}: {ending} is the ending of another kind of file; use one of {', '.join(own)}"
-        )
+        raise InputError(f"{option} {file}: {ending} is the ending of another kind of file; use {choice(own)}")
 
 
 def _refuse_input(file: Path) -> None:

@@ -161,7 +161,7 @@ BROUGHT_ROWS = [
     Row("masks, logits of a network", mask_files(lambda path, plane: np.save(path, plane / 12.75 - 10.0), ".npy"),
         "refused", 'numpy.save("0000.npy", array > 0)'),
     Row("masks, annotations of COCO", mask_file("m.json", lambda path: path.write_text(json.dumps({"images": []}))),
-        "refused", "use a file that ends in .png"),
+        "refused", "use a file that ends in one of .png"),
     Row("masks, one folder per object", by_object, "refused", "it holds the folders 1, 2: give one of them"),
     Row("masks, one JSON per frame", mask_files(lambda path, plane: path.write_text("{}"), ".json"), "refused",
         "it holds 12 files of the ending .json"),

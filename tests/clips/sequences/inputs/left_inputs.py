@@ -109,7 +109,7 @@ COLMAP_ROWS = [
     Row("COLMAP, two models, --model", colmap("--model", "sparse/0", change=two_models), "told", "as stated",
         close(ALL[:2], 0.01)),
     Row("COLMAP, --model that is not there", colmap("--model", "3", change=two_models), "refused",
-        "use one of sparse/0, sparse/1"),
+        "use sparse/0 or sparse/1"),
     Row("COLMAP, a picture that is not registered", colmap(change=reworded("sparse/0/images.txt",
         first_to_last(0, -2))), "told",
         "1 pictures are not registered", close(ALL[:-1], 0.01)),

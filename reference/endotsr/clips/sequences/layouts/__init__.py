@@ -25,6 +25,7 @@ from endotsr.clips.sequences.unknown_source import not_there, what_it_is
 from endotsr.clips.sequences.unread import folders_of, together, unread
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
+from endotsr.untrusted.sections import choice
 
 # Statements of a user that only some layouts read; the other options depend on these.
 STATEMENTS = (
@@ -66,7 +67,7 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
     if name != "auto":
         found = {layout.name: layout for layout in layouts()}
         if name not in found:
-            raise InputError(f"layout {name!r} is not allowed; use one of auto, {', '.join(found)}")
+            raise InputError(f"layout {name!r} is not allowed; use {choice(['auto', *found])}")
         return found[name]
     if not path.exists():
         raise InputError(f"{path}: {not_there(path)}")

@@ -39,6 +39,7 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.json import Keys, integer, listed, number, read_json
 from endotsr.untrusted.names import counted, relative_path
+from endotsr.untrusted.sections import choice
 from endotsr.untrusted.yaml import matrix
 
 FILES = ("transforms.json", "transforms_train.json")
@@ -49,7 +50,7 @@ PATHS = ("file_path", "mask_path", "depth_file_path")
 INTRINSICS = ("fl_x", "fl_y", "cx", "cy")
 MODELS = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE")
 CAMERA = {
-    "camera_model": f"camera model, one of {', '.join(MODELS)}",
+    "camera_model": f"camera model, {choice(MODELS)}",
     "fl_x fl_y cx cy": "focal lengths and principal point, pixels",
     "w h": "size of the pictures, pixels",
     "k1 k2 p1 p2 k3": "distortion in OpenCV's model",
@@ -107,7 +108,7 @@ def read_intrinsics(data: Keys, frame: Keys, size: tuple[int, int], where: str) 
     """The intrinsics of a frame, by default those of the file. Raises InputError."""
     found = data | frame
     if found.get("camera_model", MODELS[0]) not in MODELS:
-        raise InputError(f"{where}: camera_model {found.get('camera_model')!r}; use one of {', '.join(MODELS)}")
+        raise InputError(f"{where}: camera_model {found.get('camera_model')!r}; use {choice(MODELS)}")
     width, height = (integer(found.get(key, side), f"{where}: {key}", 1) for key, side in zip(("w", "h"), size))
     angles = {
         key: number(found[key], f"{where}: {key}", 1e-3, 3.14)
