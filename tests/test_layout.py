@@ -60,7 +60,8 @@ def test_the_definition_knows_numpy_alone():
     for name, tree in house.modules().items():
         if house.room(name) == "definition":
             nodes = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
-            assert {part.split(".")[0] for node in nodes for part in house.names_of(node)} <= known, name
+            more = {"signal"} if name == "definition.__main__" else set()  # its output may be a pipe that closes
+            assert {part.split(".")[0] for node in nodes for part in house.names_of(node)} <= known | more, name
     assert {house.room(b) for a, b in house.imports() if house.room(a) == "definition"} == {"definition"}
     users = {house.room(a) for a, b in house.imports() if house.room(b) == "definition"}
     assert users == {"definition", "port.stages"}, "nothing that is fitted computes with the definition"

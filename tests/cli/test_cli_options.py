@@ -159,7 +159,12 @@ PRESETS_ALLOWED = "is not allowed; use one of paper, sharp, quick, demo\n"
     [  # choices are listed in their order and without None
         ("train simulated --preset fast", f"--preset 'fast' {PRESETS_ALLOWED}"),
         ("train simulated --preset None", f"--preset 'None' {PRESETS_ALLOWED}"),
-        ("render run --frames x --out y", "--frames 'x' is not allowed; use one of test, train, all\n"),
+        (
+            "render run --frames x --out y",
+            "--frames 'x' is not allowed; use one of test, train, all; the view of one frame is --camera",
+        ),
+        ("render run --frames 12 --out y", "the view of one frame is --camera FRAME"),
+        ("train simulated --out=", "--out '' is not allowed; use a path"),
         # a mistyped option is named before the words that are missing
         ("render --ot x", "--ot: no such option; did you mean --out?"),
         ("render run --out x --model.beta 1", "--model.beta: no such option"),

@@ -54,10 +54,10 @@ def test_a_log_on_a_full_disk_ends_with_one_warning_and_the_command_goes_on(quie
 PRINTS = (["--help"], ["--version"], ["--completion", "bash"], ["check", "--help"], ["golden", "judge", "--help"])
 
 
-def code_and_errors(words, output, unbuffered, errors=subprocess.PIPE):
+def code_and_errors(words, output, unbuffered, errors=subprocess.PIPE, module="endotsr"):
     """Exit code and standard error of a process of its own, whose exit writes what is left in its buffers."""
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"} | unbuffered
-    command = [sys.executable, "-m", "endotsr", *words]
+    command = [sys.executable, "-m", module, *words]
     done = subprocess.run(command, stdout=output, stderr=errors, env=environment, text=True, timeout=300)
     return done.returncode, done.stderr
 
@@ -75,6 +75,10 @@ def left_by_its_reader():
 def test_a_closed_pipe_ends_a_command_without_a_traceback(unbuffered, left_by_its_reader):
     for words in PRINTS:
         assert code_and_errors(words, left_by_its_reader, unbuffered) == (141, ""), words
+    for module in ("definition", "port.judge"):  # -13: the signal itself ends a program of numbers
+        words = ["--help"] if module == "port.judge" else []
+        code, said = code_and_errors(words, left_by_its_reader, unbuffered, module=f"endotsr.{module}")
+        assert (code, said) == (-13, ""), module
     refused = ["check", "no such folder"]
     assert code_and_errors(refused, left_by_its_reader, unbuffered, left_by_its_reader) == (2, None)
 

@@ -86,6 +86,14 @@ def test_a_negative_number_is_a_value(word):
     assert tried("--offset", word).offset == tried(f"--offset={word}").offset == float(word)
 
 
+def test_frames_from_the_end_are_a_value():
+    for word in ("-5:", "-5:-1", "-9::2", "-5,-2:"):
+        assert tried("--sequence.frames", word).settings.sequence.frames == word
+    assert tried("--out", "-5").out == Path("-5")
+    with pytest.raises(InputError, match=r"--sequence\.frames: missing value TEXT"):
+        tried("--sequence.frames", "-x")
+
+
 def test_several_values_and_none():
     assert tried("--sizes", "3", "4", "5").sizes == (3, 4, 5)
     with pytest.raises(InputError, match="--sizes: missing value"):

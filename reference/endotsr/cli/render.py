@@ -12,6 +12,8 @@ from endotsr.untrusted.names import counted
 if TYPE_CHECKING:
     from endotsr.results.export.scene import MovingScene
 
+OF_ONE_FRAME = "; the view of one frame is --camera FRAME, and its time --times T, from 0 to 1"
+
 
 @dataclass
 class RenderOptions:
@@ -30,7 +32,7 @@ class RenderOptions:
     """film to write: .mp4 (H.264), .webm (VP9) or .gif"""
     times: Annotated[tuple[float, ...], Option("T [T ...]")] = ()
     """normalised times in [0, 1]"""
-    frames: Literal["test", "train", "all"] | None = None
+    frames: Annotated[Literal["test", "train", "all"] | None, Option(otherwise=OF_ONE_FRAME)] = None
     """the frames of the sequence instead of --times (default: test; for a film only: all)"""
     count: Annotated[int | None, Option("N")] = None
     """number of times, evenly spaced over [0, 1], instead of --times"""

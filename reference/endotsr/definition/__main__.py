@@ -1,5 +1,7 @@
 """`python -m endotsr.definition`: trains the scene of `simulate` and prints its losses and its PSNR."""
 
+import signal
+
 import numpy as np
 
 from endotsr.definition.settings import SMALL
@@ -15,6 +17,8 @@ def report(state, view):
 
 
 if __name__ == "__main__":
+    if hasattr(signal, "SIGPIPE"):  # the end of `... | head`, in place of an error; Windows has none
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     sequence = simulate()
     model = train(sequence, SMALL, np.random.default_rng(0), on_iteration=report)
     for name, indices in (("training", sequence.train_index), ("held-out", sequence.test_index)):

@@ -32,6 +32,7 @@ class Option:
     positional: bool = False  # an argument without a name
     may_be_empty: bool = False  # of several values: none is allowed
     written: bool = False  # an output file, checked before the computation
+    otherwise: str = ""  # the end of the message on a value that is not allowed: the option that may be meant
     flat: bool = False  # a section of settings whose options omit the name of the field
     short: tuple[str, ...] = ()  # keys of a section that also exist without its name: `--scale`
 
@@ -50,6 +51,7 @@ class Field:
     positional: bool
     may_be_empty: bool = False
     written: bool = False
+    otherwise: str = ""
 
     @property
     def in_section(self) -> bool:
@@ -113,6 +115,7 @@ def _walk(kind: type, values: Any, path: tuple[str, ...], prefix: str, section: 
                 positional=note.positional,
                 may_be_empty=note.may_be_empty,
                 written=note.written,
+                otherwise=note.otherwise,
             )
 
 

@@ -13,6 +13,7 @@ import argparse
 import math
 import re
 from decimal import Decimal
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
@@ -33,6 +34,7 @@ T = TypeVar("T")
 HELP_ALL = "--help-all"
 HELP = {"-h", "--help", HELP_ALL}
 THOUSANDS = {"k": 1e3, "K": 1e3, "M": 1e6}
+FROM_END = re.compile(r"-\d*:[-\d:,.s]*|-\d+s?,[-\d:,.s]+")  # frames counted from the end: -5: or -5:-1
 NEGATIVE = re.compile(r"-\d+|-\d*\.\d+")  # numbers of argparse before Python 3.14
 SWITCH_WORDS = {"true": True, "false": False}  # after a switch, as in a settings file
 
@@ -144,7 +146,7 @@ def _plain_words(fields: list[Field], words: list[str]) -> list[str]:
             out.append(_switched(negated[name], value, on=False))
         elif before and before.switch and word.lower() in SWITCH_WORDS:
             out[-1] = _switched(before, word)
-        elif before and not before.switch and before.count == 1 and _is_negative(word):
+        elif before and not before.switch and before.count == 1 and (_is_negative(word) or FROM_END.fullmatch(word)):
             out[-1] += f"={word}"
         else:
             out.append(_without_exponent(word) if several and _is_negative(word) else name + equals + value)
@@ -201,7 +203,7 @@ def converted(kind: Any, word: str) -> Any:
             except ValueError:
                 continue
         raise ValueError(word)
-    if kind is NoneType:
+    if kind is NoneType or (kind is Path and not word.strip()):  # Path("") is the working folder
         raise ValueError(word)
     return kind(word)
 
@@ -210,7 +212,7 @@ def _refused(field: Field, word: str) -> InputError:
     allowed = allowed_values(field.item) + _written_out(field, word)
     if field.in_section:
         return InputError(f"command line: {field.key} = {word!r} is not allowed; use {allowed}")
-    return InputError(f"{field.name} {word!r} is not allowed; use {allowed}")
+    return InputError(f"{field.name} {word!r} is not allowed; use {allowed}{field.otherwise}")
 
 
 def _written_out(field: Field, word: str) -> str:

@@ -1,7 +1,7 @@
 """The lines of a trajectory file: `stamp tx ty tz qx qy qz qw` of TUM and EuRoC, the matrices of KITTI, or .npy.
 
-A head line that names position and quaternion states the columns, in any order; without one, the order is the one
-above. Lines that begin with # are comments. Matrices have no stamps: one per frame, in order.
+A head line that names position and quaternion, or rotation vector, states the columns, in any order; without one, the
+order is the one above. Lines that begin with # are comments. Matrices have no stamps: one per frame, in order.
 """
 
 import re
@@ -38,17 +38,22 @@ UNIT = re.compile(r"[xyz]\s*(?:[\[(]\s*|_)(um|mm|cm|m)\b")  # behind the name of
 NORM_TOLERANCE = 1e-2  # of a quaternion written with few digits
 # Names in head lines, in lower case: the axis is the last letter, behind q, t, p or the words that stand for them.
 QUATERNION = re.compile(r"(?:q|quat|quaternion|rot|orientation)(?:[._]\w*?)??[._]?([wxyz])")
-POSITION = re.compile(r"(?:(?:t|p|pos|position|trans|translation)(?:[._]\w*?)??[._]?)?([xyz])")
+# A rotation vector by its name alone: rx ry rz and rot_x are angles in as many programs.
+VECTOR = re.compile(r"(?:rvec|rotvec|rotation_vector|axis_?angle|angle_?axis|rodrigues)[._]?([xyz012])")
+UNCLEAR = re.compile(r"(?:r|rot|rotation|orientation)[._]?[xyz]")
+POSITION = re.compile(r"(?:(?:t|p|pos|position|trans|translation)(?:[._]\w*?)??[._]?)?([xyz])|tvec[._]?([xyz012])")
 FIELDS = Inventory(
     "the columns of a trajectory, as its head line names them",
     used={
         "stamp": "the first column: seconds, frame number, or nanoseconds as in EuRoC",
         "tx ty tz": "position",
         "qx qy qz qw": "unit quaternion, in the order of the head line or x y z w",
+        "rvec_x rvec_y rvec_z": "rotation vector in radians, by a head line that names it rvec, rotvec or rodrigues",
     },
     harmless={"v_* b_* w_* vel* bias* gyro* acc*": "velocities and sensor biases follow from no picture"},
 )
 USED = ("tx", "ty", "tz", "qx", "qy", "qz", "qw")
+OF_VECTORS = ("tx", "ty", "tz", "rvec_x", "rvec_y", "rvec_z")
 
 
 class StoredPose(NamedTuple):
@@ -87,7 +92,7 @@ def stored_poses(path: Path) -> StoredPoses:
                  for k, (where, row) in enumerate(lines)]  # fmt: skip
         return StoredPoses(found, False, [])
     names, notes = _columns_of(path, head, sizes.pop())
-    place = [names.index(name) for name in USED]
+    place = [names.index(name) for name in (OF_VECTORS if "rvec_x" in names else USED)]
     stamp = names.index("stamp") if "stamp" in names else None
     found = []
     for k, (where, row) in enumerate(lines):
@@ -110,7 +115,8 @@ def _columns_of(path: Path, head: list[str], size: int) -> tuple[list[str], list
     if len(head) != size:
         raise InputError(f"{path}: its head line names {len(head)} columns, its lines have {size} numbers; {ALLOWED}")
     order = " ".join(name[1] for name in head if name in USED[3:])
-    return head, [f"quaternions are {order} by the head line", *FIELDS.noted(head, path)]
+    how = f"quaternions are {order}" if order else "rotations are vectors in radians"
+    return head, [f"{how} by the head line", *FIELDS.noted(head, path)]
 
 
 def _array_lines(path: Path) -> list[tuple[str, list[float]]]:
@@ -139,8 +145,11 @@ def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str], s
         if not words or words[0].startswith("#") or (row is None and not found and _named_columns(line)):
             if named := _named_columns(line):
                 head, unit = named, _stated_unit(line)
+            else:
+                _refuse_unclear(line, where)
             continue
         if row is None or len(row) not in (*COLUMNS, len(head)) or not np.isfinite(row).all():
+            _refuse_unclear(line, where)
             raise InputError(f"{where}: {ALLOWED}{_no_number(words, used)}{decimal_commas(line)}{_angles(line)}")
         found.append((where, row))
     return found, head, unit
@@ -150,7 +159,7 @@ def _used(words: list[str], head: list[str]) -> list[bool]:
     """Whether each word of a line is of a column that is used; without a name for each, all are."""
     if len(head) != len(words):
         return [True] * len(words)
-    return [k == 0 or name in USED for k, name in enumerate(head)]
+    return [k == 0 or name in USED + OF_VECTORS for k, name in enumerate(head)]
 
 
 def _numbers(words: list[str], used: list[bool]) -> list[float] | None:
@@ -187,6 +196,17 @@ def _angles(line: str) -> str:
     return "; angles are not read: write quaternions" if re.search("roll|pitch|yaw|euler", line.lower()) else ""
 
 
+def _refuse_unclear(line: str, where: str) -> None:
+    """Raise InputError for a head line with three columns of a rotation that may be angles or a rotation vector."""
+    words = [word.strip().lower() for word in re.sub(r"\[[^\]]*\]|\([^)]*\)|[#\",;]", " ", line[:LONGEST_HEAD]).split()]
+    named = [word for word in words if UNCLEAR.fullmatch(word)]
+    if len(named) == 3 and sum(bool(POSITION.fullmatch(word)) for word in words) == 3:
+        raise InputError(
+            f"{where}: {' '.join(named)}: angles, or a rotation vector; angles are not read: write quaternions; name a"
+            " rotation vector in radians rvec_x rvec_y rvec_z"
+        )
+
+
 def _named_columns(line: str) -> list[str]:
     """The columns that a line names: stamp, tx .. qw, others as they are; [] unless it names a pose."""
     if len(line) > LONGEST_HEAD:
@@ -199,15 +219,26 @@ def _named_columns(line: str) -> list[str]:
         if turned := QUATERNION.fullmatch(lower):
             found.append(f"q{turned[1]}")
         elif moved := POSITION.fullmatch(lower):
-            found.append(f"t{moved[1]}")
+            found.append(f"t{_axis(moved[1] or moved[2])}")
+        elif turned := VECTOR.fullmatch(lower):
+            found.append(f"rvec_{_axis(turned[1])}")
         else:
             found.append(word if k else "stamp")
-    return found if all(found.count(name) == 1 for name in USED) else []
+    return found if any(all(found.count(name) == 1 for name in names) for names in (USED, OF_VECTORS)) else []
+
+
+def _axis(letter: str) -> str:
+    return "xyz"[int(letter)] if letter.isdecimal() else letter
 
 
 def _rotation(quaternion: list[float], where: str) -> FloatArray:
+    """(3, 3) of a quaternion, or of a rotation vector (3,) in radians. Raises InputError for another length."""
     from scipy.spatial.transform import Rotation
 
+    if len(quaternion) == 3:
+        if (length := np.linalg.norm(quaternion)) > 2 * np.pi + NORM_TOLERANCE:
+            raise InputError(f"{where}: the rotation vector has length {length:.4g}; use radians, 2 pi at most")
+        return Rotation.from_rotvec(quaternion).as_matrix()
     length = np.linalg.norm(quaternion)
     if abs(length - 1) > NORM_TOLERANCE:
         raise InputError(f"{where}: the quaternion has length {length:.4g}; use 1, in the order x y z w")

@@ -35,6 +35,10 @@ from endotsr.clips.sequences.sources import files_of
 from endotsr.errors import InputError
 from endotsr.untrusted.writing import replace_text, replacing_folder
 
+FIXED_POINT = ((16, "StereoBM and StereoSGBM of OpenCV"), (256, "16-bit PNG of KITTI and others"))
+NO_MATCH = (-16, 65520)  # one pixel below a smallest disparity of 0, times 16, and as an integer without a sign
+# Of the width: the largest median disparity, at which the views share half of a picture; and a usual one.
+WIDEST, USUAL_DISPARITY = 0.5, 0.08
 EXCHANGED = 3.0  # ratio of matches that indicates exchanged left and right pictures
 OnFrame = Callable[[int, int], None]
 Kind = Literal["depth", "disparity"]
@@ -130,7 +134,7 @@ def depth_of_values(
             raise InputError(f"{where}: disparity needs the baseline: [camera] baseline is 0 in sequence.toml")
         if (numbers <= 0).all():
             numbers = -numbers
-        _refuse_wide(numbers, values.shape[1], where)
+        _refuse_fixed_point(numbers, values, scale, where)
         focal = intrinsics.fx * values.shape[1] / intrinsics.width
         numbers = np.divide(focal * baseline, numbers, out=np.zeros_like(numbers), where=numbers > 0)
     depth = resized_nearest(np.maximum(numbers, 0.0), intrinsics.width, intrinsics.height, where).astype(np.float32)
@@ -138,15 +142,18 @@ def depth_of_values(
     return depth
 
 
-def _refuse_wide(disparity: NDArray, width: int, where: object) -> None:
-    """Raises InputError for disparities that are wider than the picture, such as those that are stored times 256."""
-    found = disparity[disparity > 0]
-    middle = float(np.median(found)) if found.size else 0.0
-    if middle > width:
-        raise InputError(
-            f"{where}: the median disparity is {middle:g} pixels, and the picture is {width} pixels wide; disparities"
-            f" times 256 (16-bit PNG of KITTI and others): --unit-scale {1 / 256}"
-        )
+def _refuse_fixed_point(disparity: NDArray, stored: NDArray, scale: float, where: object) -> None:
+    """Raises InputError for disparities that are stored times 16 or 256, by their size or by the mark of OpenCV."""
+    found, width = disparity[disparity > 0], stored.shape[1]
+    middle = float(np.median(found)) / width if found.size else 0.0
+    marks = stored[np.isin(stored, NO_MATCH)] if scale == 1 and not (stored % 1).any() else stored[:0]
+    if not marks.size and middle <= WIDEST:
+        return
+    fits = [abs(np.log(middle / times / USUAL_DISPARITY)) for times, _ in FIXED_POINT] if middle else [0.0]
+    times, whose = FIXED_POINT[0 if marks.size else int(np.argmin(fits))]
+    why = f"the median disparity is {middle * width:g} pixels, and the picture is {width} pixels wide"
+    why = f"{marks[0]:g} marks pixels without a match" if marks.size else why
+    raise InputError(f"{where}: {why}; disparities times {times} ({whose}): --unit-scale {1 / times}")
 
 
 def _without_mark(depth: NDArray[np.float32], kind: Kind, file: Path) -> NDArray[np.float32]:

@@ -20,7 +20,6 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.kernels.exponential import LOG2_E, exp2_nonpositive
 from endotsr.method.kernels.jit import jit
 from endotsr.method.kernels.threads import parallel_for
-from endotsr.untrusted.sections import choice
 
 Basis = Literal["quartic", "gaussian"]
 BASES: tuple[Basis, ...] = ("quartic", "gaussian")
@@ -104,7 +103,7 @@ def deformation_reverse(d_offsets: FloatArray, saved: DeformationSaved) -> Defor
 
 def _check(weight: FloatArray, centre: FloatArray, width: FloatArray, basis: str) -> None:
     if basis not in BASES:
-        raise ValueError(f"basis: {basis!r} is unknown; use {choice(BASES)}")
+        raise ValueError(f"basis: {basis!r} is unknown; use one of {', '.join(BASES)}")
     if weight.ndim != 3 or weight.shape[0] != CHANNELS:
         raise ValueError(f"fdm_weight: expected (10, B, N), got {weight.shape}")
     for name, array in (("fdm_centre", centre), ("fdm_width", width)):

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.kernels.jit import jit
 from endotsr.method.kernels.threads import parallel_for
-from endotsr.untrusted.sections import choice
 
 Upsampling = Literal["co_sited", "half_pixel"]
 
@@ -37,7 +36,7 @@ ROWS = 16  # rows in one partial sum of magnitudes
 def expand_weights(upsampling: Upsampling) -> tuple[float, float]:
     """(even, odd) of an up-sampling rule. Raises ValueError for an unknown name."""
     if upsampling not in EXPAND_WEIGHTS:
-        raise ValueError(f"upsampling {upsampling!r}; use {choice(EXPAND_WEIGHTS)}")
+        raise ValueError(f"upsampling {upsampling!r}; use one of {', '.join(EXPAND_WEIGHTS)}")
     return EXPAND_WEIGHTS[upsampling]
 
 

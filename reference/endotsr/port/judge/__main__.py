@@ -5,6 +5,7 @@ It has no search for the line of the definition that a port computes: `endotsr g
 
 import argparse
 import os
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -112,4 +113,6 @@ def main(words: list[str]) -> int:
 
 
 if __name__ == "__main__":
+    if hasattr(signal, "SIGPIPE"):  # the end of `... | head`, in place of an error; Windows has none
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     sys.exit(main(sys.argv[1:]))

@@ -139,6 +139,7 @@ WRONG = {
     "pose turn": (lambda p: poses(p, turn), "pose-turn", "warning", 4),
     "poses in metres": (lambda p: poses(p, lambda r: drift(r, 1e-4 / 8)), "pose-unit", "warning", None),
     "poses in micrometres": (lambda p: poses(p, lambda r: drift(r, 1e3)), "pose-unit", "warning", None),
+    "negatives": (lambda p: each(p, "images", lambda x: 255 - x), "negative-pictures", "warning", None),
     "red and blue exchanged": (lambda p: each(p, "images", lambda x: x[:, :, ::-1]), "blue-pictures", "warning", None),
     "two views in turn": (lambda p: each(p, "images", lambda x: np.roll(x, 20, 1), range(1, FRAMES, 2)),
                           "alternating-views", "warning", None),

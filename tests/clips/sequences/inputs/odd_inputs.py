@@ -138,6 +138,7 @@ ODD_ROWS = [
     Row("GIF", gif, "refused", "no known layout"),
     Row("pictures, moving PNG", folder_of(pictures(), change=converted("png", save_all=True, append_images=[blank()])),
         "refused", "holds 2 pictures"),
+    Row("pictures, negatives", folder_of([255 - p for p in pictures()]), "told", "negative-pictures"),
     Row("pictures, red and blue exchanged", folder_of([p[..., ::-1] for p in pictures()]), "told", "blue-pictures"),
     Row("pictures, PNG that states linear light", folder_of(pictures(), change=converted("png", pnginfo=linear())),
         "told", "other than sRGB", close(pictures(), 0.01)),

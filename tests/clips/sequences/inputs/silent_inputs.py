@@ -84,6 +84,12 @@ def turned_first(found: np.ndarray) -> np.ndarray:
     return np.column_stack([np.arange(len(found)), quaternions(found), found[:, :, 3]])
 
 
+def as_vectors(found: np.ndarray) -> np.ndarray:
+    """The rotation as a vector in radians before the position, as solvePnP of OpenCV gives it."""
+    vectors = Rotation.from_matrix(found[:, :, :3]).as_rotvec()
+    return np.column_stack([np.arange(len(found)), vectors, found[:, :, 3]])
+
+
 def of_euroc(found: np.ndarray) -> np.ndarray:
     """Seventeen columns: nanoseconds, position, w x y z, velocity and two biases."""
     stamps = 1403636579763555584 + 4e7 * np.arange(len(found))
@@ -168,6 +174,15 @@ POSES = [
     Row("trajectory, the quaternion before the position by the head line",
         with_poses("t.txt", turned_first, headed("# stamp qx qy qz qw tx ty tz")), "told", "x y z w by the head line",
         true_poses),
+    Row("trajectory, rotation vectors by the head line",
+        with_poses("t.csv", as_vectors, headed("frame,rvec_x,rvec_y,rvec_z,tvec_x,tvec_y,tvec_z", ",")), "told",
+        "rotations are vectors in radians by the head line", true_poses),
+    Row("trajectory, rotation vectors or angles",
+        with_poses("t.csv", as_vectors, headed("frame,rx,ry,rz,tx,ty,tz", ",")), "refused",
+        "rx ry rz: angles, or a rotation vector; angles are not read: write quaternions"),
+    Row("trajectory, rotation vectors in degrees",
+        trajectory(["# stamp tx ty tz rvec0 rvec1 rvec2", *(f"{i} 0 0 {i} 0 90 0" for i in range(12))]), "refused",
+        "the rotation vector has length 90; use radians"),
     Row("trajectory of EuRoC with seventeen columns", with_poses("data.csv", of_euroc, headed(EUROC_HEAD, ",")), "told",
         "w x y z by the head line", true_poses),
     Row("trajectory in nanoseconds, two poses a frame",
@@ -298,17 +313,22 @@ def corner_is_empty(folder: Path) -> bool:
     return bool((seen[:19, :29] == 0).all() and (seen > 0).mean() > 0.9)
 
 
-def disparity(times: float, *words: str):
-    """Disparities of a clip as 16-bit PNG."""
+def disparity(times: float, *words: str, marked: bool = False):
+    """Disparities of a clip as 16-bit PNG, or with a sign and -16 at pixels without a match, as OpenCV has them."""
 
     def make(folder: Path) -> list[str]:
         where, given = one_view.clip(folder, lambda i: 1800 / true_depth(i))
-        stored, file = where / "sequence.toml", read_sequence_file(where)
-        stored.write_text(stored.read_text().replace("baseline = 0.0", "baseline = 4.0"))
+        text, file = where / "sequence.toml", read_sequence_file(where)
+        text.write_text(text.read_text().replace("baseline = 0.0", "baseline = 4.0"))
         for k, one_file in enumerate(sorted(given.iterdir())):
             pixels = file.camera.fx * 4.0 / true_depth(k)
-            write_png(one_file.with_suffix(".png"), np.rint(pixels * times).astype(np.uint16))
+            stored = np.rint(pixels * times).astype(np.uint16)
             one_file.unlink()
+            if marked:
+                stored[:2] = -16 & 0xFFFF
+                np.save(one_file, stored.astype(np.int16))
+            else:
+                write_png(one_file.with_suffix(".png"), stored)
         return ["depth", str(where), "--given", str(given), "--kind", "disparity", *words]
 
     return make
@@ -316,7 +336,7 @@ def disparity(times: float, *words: str):
 
 def depth_of_disparity(folder: Path) -> bool:
     found = describe(next(folder.glob("*/sequence.toml")).parent).depth
-    return found is not None and np.abs(found(2) - true_depth(2)).max() < 1
+    return found is not None and np.abs(found(2) - true_depth(2))[2:].max() < 1
 
 
 def marked_video(name: str, mark: str, *words: str, frames=None):
@@ -385,6 +405,11 @@ DEPTHS = [
         depth=plane.astype(np.float32)), ".npz"), "right", "", depth_is_true),
     Row("depth, TIFF with a number that means none", depth_files(with_no_data, ".tif"), "right", "", corner_is_empty),
     Row("disparity times 256", disparity(256), "refused", "--unit-scale 0.00390625"),
+    Row("disparity times 16 of OpenCV", disparity(16), "refused", "--unit-scale 0.0625"),
+    Row("disparity times 16 of OpenCV, of far tissue", disparity(16 / 3, marked=True), "refused",
+        "-16 marks pixels without a match; disparities times 16"),
+    Row("disparity times 16 of OpenCV, --unit-scale", disparity(16, "--unit-scale", "0.0625", marked=True), "right", "",
+        depth_of_disparity),
     Row("disparity times 256, --unit-scale", disparity(256, "--unit-scale", "0.00390625"), "right", "",
         depth_of_disparity),
 ]  # fmt: skip

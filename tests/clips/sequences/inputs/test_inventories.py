@@ -71,7 +71,8 @@ def test_the_base_has_every_used_field_or_a_change_adds_it(name):
     tried = {*found.changed, *found.base}
     spelled = {"nerfstudio frame": {"camera_angle_x", "camera_angle_y"}, "ros": ALIASES, "ros echo": ALIASES,
                "opencv": OTHER_NAMES, "tiff": BY_LIBTIFF, "bmp": BY_PILLOW, "matlab": {"FocalLength", "PrincipalPoint"},
-               "bouguet": {"fc", "cc", "kc"}, **REPEATED, **OF_FOLDERS}.get(name, set())  # fmt: skip
+               "bouguet": {"fc", "cc", "kc"},
+               "trajectory": {"rvec_x", "rvec_y", "rvec_z"}, **REPEATED, **OF_FOLDERS}.get(name, set())  # fmt: skip
     for pattern in patterns:
         inventory = Inventory("", {pattern: "x"})
         known = pattern in spelled or any(inventory.reason(inventory.used, field) for field in tried)

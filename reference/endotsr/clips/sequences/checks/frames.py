@@ -132,11 +132,19 @@ def _of_clip(facts: list[FrameFacts], means: NDArray[np.floating], where: str) -
 
 
 def _blue_finding(facts: list[FrameFacts], where: str) -> list[Finding]:
-    """A warning on a clip whose pictures are more blue than red."""
-    blueness = float(np.median([fact.small[:, :, 2].mean() - fact.small[:, :, 0].mean() for fact in facts] or [0.0]))
-    if blueness < BLUE:
+    """A warning on a clip whose pictures are more blue than red: red and blue exchanged, or a negative.
+
+    Tissue has far more red than green, and hardly more green than blue. The far step is from blue to green once red and
+    blue are exchanged, and from green to red in a negative.
+    """
+    means = np.array([fact.small.mean(axis=(0, 1)) for fact in facts] or [np.zeros(3)])
+    red, green, blue = np.median(means, axis=0).tolist()
+    if blue - red < BLUE:
         return []
-    return [finding("blue-pictures", where, f"blue is {blueness:.0f} grey levels above red on average")]
+    negative = green - red > blue - green
+    what = f"blue is {blue - red:.0f}" + (f" and green {green - red:.0f}" if negative else "")
+    code = "negative-pictures" if negative else "blue-pictures"
+    return [finding(code, where, f"{what} grey levels above red on average")]
 
 
 def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding]:

@@ -126,6 +126,8 @@ KINDS: dict[str, Kind] = {
                               "prepare the recording with the calibration of both cameras: --calibration FILE"),
     "blue-pictures": Kind("warning", "tissue is red: red and blue may be exchanged, as OpenCV stores them",
                           "export the pictures again as RGB; none needed for blue light"),
+    "negative-pictures": Kind("warning", "tissue is red, and bright where it is near: these may be negatives, 255 - x",
+                              "export the pictures again; none needed for green or blue light"),
     "colour-profile": Kind("note", "its values are read as sRGB: colours differ from those in a viewer",
                            "convert the pictures to sRGB where colours matter"),
     "grey-pictures": Kind("note", "polarity cannot be checked by colour", "none needed"),
