@@ -24,6 +24,7 @@ from endotsr.clips.sequences.forecast.work import at_start, iteration_work, work
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened, with_settings
 from endotsr.training.fitting.records import Making
+from endotsr.training.runs.speed import TRAINED, KnownSpeed
 from endotsr.training.runs.time_left import (
     LEAST_QUIET,
     PATIENCE,
@@ -46,6 +47,11 @@ class Clock:
 
     def monotonic(self):
         return self.now
+
+
+def known(unit):
+    """The speed of a machine on which a training took this time per unit."""
+    return KnownSpeed(unit, Beside(), TRAINED)
 
 
 def plan_of(preset, count, threads):
@@ -238,12 +244,11 @@ def test_iterations_without_the_second_thread_tell_the_speed_once_there_are_some
 def test_the_first_line_adds_up_and_names_what_comes_first():
     plan = plan_of("quick", 156, 2)._replace(perceived=True)
     found = estimated_seconds(plan, 0.05)
-    line = waiting_line(plan, 0.05, compiled=False)
+    line = waiting_line(plan, known(0.05), compiled=False)
     assert line.startswith(f"about {in_words(sum(found) - found.reading + 30)} for 156 frames (at the speed of the ")
     assert ": initial motion " in line and ", compilation, once 0:30, " in line and line.count(",") == 4
-    assert "compilation" not in waiting_line(plan, None, compiled=True)
-    assert "assumed" in waiting_line(plan, None, compiled=True)
-    assert "evaluation" not in waiting_line(plan._replace(perceived=None), None, compiled=True)
+    assert "compilation" not in waiting_line(plan, known(0.05), compiled=True)
+    assert "evaluation" not in waiting_line(plan._replace(perceived=None), known(0.05), compiled=True)
 
 
 def test_the_first_line_of_a_resumed_training_tells_what_is_left():
@@ -252,12 +257,16 @@ def test_the_first_line_of_a_resumed_training_tells_what_is_left():
     whole, rest = estimated_seconds(plan, 0.05), estimated_seconds(plan, 0.05, at)
     assert rest.start == 0 and rest.evaluation == whole.evaluation
     assert rest.iterations == pytest.approx(100 * 0.05, rel=0.2) and 0 < rest.targets < whole.targets
-    assert ": 100 iterations " in waiting_line(plan, 0.05, True, at)
-    assert waiting_line(plan, 1e-12, True, at).endswith(" (at the speed of the last training)"), (
+    assert ": 100 iterations " in waiting_line(plan, known(0.05), True, at)
+    assert waiting_line(plan, known(1e-12), True, at).endswith(" (at the speed of the last training)"), (
         "no part takes a second"
     )
-    assert "iterations" not in waiting_line(plan, 0.05, True, at._replace(iteration=plan.config.training.iterations))
-    assert "initial motion" in waiting_line(plan, 0.05, True, at._replace(iteration=0)), "no checkpoint was written"
+    assert "iterations" not in waiting_line(
+        plan, known(0.05), True, at._replace(iteration=plan.config.training.iterations)
+    )
+    assert "initial motion" in waiting_line(plan, known(0.05), True, at._replace(iteration=0)), (
+        "no checkpoint was written"
+    )
     without = plan._replace(config=with_settings(plan.config, model={"spectral_motion": False}))
     assert estimated_seconds(without, 0.05).start == 0 < whole.start, "nothing is tracked without component S"
 
@@ -269,7 +278,8 @@ def test_the_training_of_the_base_model_is_part_of_the_forecast():
     one, other = estimated_seconds(given, 0.1), estimated_seconds(auto, 0.1)
     assert 0.3 < other.calibration / one.iterations < 0.5, "3000 iterations before 6000"
     assert other._replace(calibration=0.0) == one and other.training > one.training
-    assert ", calibration " in waiting_line(auto, 0.1, True) or ": calibration " in waiting_line(auto, 0.1, True)
+    line = waiting_line(auto, known(0.1), True)
+    assert ", calibration " in line or ": calibration " in line
     at = at_start(given.config)._replace(iteration=10)
     assert estimated_seconds(given, 0.1, at) == estimated_seconds(auto, 0.1, at)
     base = with_settings(auto.config, model={"laplacian": False})

@@ -1,9 +1,12 @@
 """The speed of the machine between trainings: kept only if enough was timed, and never in the way."""
 
 import pytest
+from tiny import train_words
 
-from endotsr.clips.sequences.forecast.seconds import Beside
-from endotsr.training.runs import speed
+from endotsr.cli.main import main
+from endotsr.cli.parts import waiting
+from endotsr.clips.sequences.forecast.seconds import Beside, assumed_unit
+from endotsr.training.runs import pace, speed
 
 
 @pytest.fixture
@@ -47,3 +50,24 @@ def test_the_speeds_of_the_parts_are_kept_beside_one_another(kept):
     assert speed.remembered_beside(2) == Beside(0.2, 0.3)
     kept.write_text(kept.read_text().replace("0.2", '"fast"'))
     assert speed.remembered_beside(2) == Beside(None, 0.3), "one damaged number"
+
+
+def test_the_last_training_is_the_speed_then_the_timed_iterations_and_an_assumed_one(kept):
+    speed.remember_beside(2, Beside(start=0.17), 90_000)
+    assert speed.known_speed(2, lambda: 0.3) == speed.KnownSpeed(0.3, Beside(0.17), speed.TIMED)
+    assert speed.known_speed(2) == speed.KnownSpeed(assumed_unit(2), Beside(0.17), speed.ASSUMED)
+    speed.remember_unit(2, 0.1, 900, 90_000)
+    assert speed.known_speed(2, pytest.fail) == speed.KnownSpeed(0.1, Beside(0.17), speed.TRAINED)
+
+
+@pytest.mark.parametrize(
+    ("least", "source"), [(1, "at the speed of a few iterations"), (80_000, "the speed of this machine is assumed")]
+)
+def test_the_first_training_on_a_machine_times_iterations_of_a_large_clip(least, source, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(speed, "LEAST_PIXELS", least)
+    monkeypatch.setattr(speed, "speed_file", lambda threads: tmp_path / "speed.json")
+    monkeypatch.setattr(waiting, "waiting_line", lambda plan, found, *rest: f"{found.source}, {found.unit:.4f} s")
+    timed = []
+    monkeypatch.setattr(pace, "seconds_of_unit", lambda sequence, config: timed.append(config) or 0.4321)
+    assert main(train_words(tmp_path / "run", "--no-evaluate", "--iterations", "1")) == 0
+    assert source in capsys.readouterr().out and len(timed) == (least == 1)

@@ -22,9 +22,10 @@ from unittest import mock
 
 from endotsr.cli.main import BLAS
 from endotsr.cli.parts import progress, waiting
-from endotsr.clips.sequences.forecast.seconds import COMPILATION, TimedCommand, assumed_unit, estimated_seconds
+from endotsr.clips.sequences.forecast.seconds import COMPILATION, TimedCommand, estimated_seconds
 from endotsr.clips.sequences.forecast.work import Standing
 from endotsr.errors import InputError
+from endotsr.method.kernels.kernel_cache import kernel_folder
 from endotsr.method.kernels.vectors import REGISTER
 from endotsr.results.evaluation.metrics import psnr
 from endotsr.results.report import live_page
@@ -74,15 +75,17 @@ class Heard:
         self.trained, self.largest_rise, self._least = 0.0, 0.0, float("inf")
         self._about: LivePage | None = None
 
-    def first_line(self, plan: TimedCommand, unit: float | None, compiled: bool, at: Standing | None = None) -> str:
+    def first_line(
+        self, plan: TimedCommand, known: speed.KnownSpeed, compiled: bool, at: Standing | None = None
+    ) -> str:
         """In place of `waiting_line`."""
-        found = estimated_seconds(plan, unit or assumed_unit(plan.threads), at)
+        found = estimated_seconds(plan, known.unit, at)
         left = sum(found) - found.reading + (0.0 if compiled else COMPILATION)
         self.said["start"] = {
             "at": self.watch.now(), "left": left, "evaluation": found.evaluation, "initial": found.start,
-            "speed": "assumed" if unit is None else "measured", "compiled": compiled,
+            "speed": SOURCES[known.source], "compiled": compiled,
         }  # fmt: skip
-        return LINE(plan, unit, compiled, at)
+        return LINE(plan, known, compiled, at)
 
     def update(self, shown: progress.Progress, entry: Any) -> None:
         """In place of `Progress.update`."""
@@ -121,13 +124,14 @@ class Heard:
         }  # fmt: skip
 
 
+SOURCES = {speed.TRAINED: "measured", speed.TIMED: "timed", speed.ASSUMED: "assumed"}
 LINE, UPDATE = waiting.waiting_line, progress.Progress.update
 
 
 def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[str, Any]:
     """One command. kept_speed: the file in which trainings keep the speed of the machine."""
     watch = Watch(wall)
-    spoken = Heard(watch)
+    spoken, cold = Heard(watch), not any(kernel_folder().glob("compiled-*"))
     clock = SimpleNamespace(monotonic=watch.now, perf_counter=watch.now, thread_time=time.thread_time)
     with tempfile.TemporaryDirectory() as root, contextlib.ExitStack() as stack:
         for module in (progress, bridged, runs_training, live_page):
@@ -144,7 +148,7 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         "clip": clip.resolve().name, "frames": about["input"]["frames"],
         "size": f"{about['input']['width']}x{about['input']['height']}", "preset": about["settings"]["preset"],
         "seed": about["seed"], "threads": about["threads"], "clock": "wall" if wall else "processor",
-        "cold": not spoken.said["start"]["compiled"], "register_bytes": REGISTER,
+        "cold": cold, "register_bytes": REGISTER,
         "iterations": about["iteration"], "gaussians": about["gaussians"], "said": spoken.said,
         "trained": spoken.trained, "whole": whole, "largest_rise": spoken.largest_rise,
         "forecast_after": progress.FORECAST_AFTER, "passes": 1, "blas_threads": 1, "curve": spoken.curve,

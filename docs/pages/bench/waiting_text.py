@@ -2,8 +2,6 @@
 
 from typing import Any
 
-from endotsr.clips.sequences.forecast import seconds as forecasts
-from endotsr.config import PRESETS, with_iterations
 from endotsr.results.report.style import BLUE, GREEN, INK, ORANGE, legend, name_axes, new_figure, plain_axes, save
 from endotsr.results.report.tables import duration, markdown
 from pages.store import figures
@@ -15,7 +13,6 @@ QUALITY = (("psnr_full", 2), ("psnr_tissue", 2), ("lpips", 4))
 COLOURS = (BLUE, GREEN, ORANGE, INK)
 CLOCKS = {"processor": "processor time of one thread", "wall": "two threads on the clock"}
 FORMERLY = 30  # iterations before the forecast of rows that do not state it
-PASSES = 3  # of the evaluation over the held-out frames, of rows that do not state it
 VECTORS = {64: "AVX-512", 32: "AVX2", 0: ""}  # by the bytes of a register; 0: not recorded
 
 
@@ -26,30 +23,6 @@ def told(row: dict[str, Any], when: str) -> str:
         return "-"
     left = row["whole"] - said["at"]
     return f"{duration(said['left'])} of {duration(left)} ({said['left'] / left - 1:+.0%})"
-
-
-def today(row: dict[str, Any]) -> str:
-    """What the first line would say with the constants of today, where it assumed the speed of a known processor.
-
-    "-" also for a row whose evaluation made several passes over the held-out frames, which took longer. A row without
-    `blas_threads` is of a former evaluation, which counts as it was timed, and of an initial motion on one thread.
-    """
-    start, register = row["said"]["start"], row["register_bytes"]
-    if start["speed"] != "assumed" or not register or row.get("passes", PASSES) > 1:
-        return "-"
-    config = with_iterations(PRESETS[row["preset"]], row["iterations"])
-    frames = forecasts.expected_frames(row["frames"], config)
-    if row["clip"].startswith("simulated"):
-        frames = frames.with_true_motion()
-    width, height = map(int, row["size"].split("x"))
-    factor = forecasts.vector_factor(register)
-    plan = forecasts.TimedCommand(config, frames, width * height, row["threads"], "lpips" in row["held_out"], factor)
-    found = forecasts.estimated_seconds(plan, forecasts.assumed_unit(row["threads"], register))
-    if "blas_threads" not in row:
-        one_way = found.start / (forecasts.BOTH_WAYS if row["threads"] > 1 else 1.0)
-        found = found._replace(start=one_way, evaluation=row["whole"] - row["trained"])
-    seconds = sum(found) - found.reading + forecasts.COMPILATION * row["cold"]
-    return f"{duration(seconds)} ({seconds / (row['whole'] - start['at']) - 1:+.0%})"
 
 
 def named(row: dict[str, Any]) -> str:
@@ -69,14 +42,15 @@ def processor(row: dict[str, Any]) -> str:
 def said(result: dict[str, Any]) -> str:
     """One row per command."""
     rows = result["rows"]
-    heads = ["Training", "Frames", "First line: said, left", "today", "Forecast", "After a minute",
+    heads = ["Training", "Frames", "First line: said, left", "Forecast", "After a minute",
              "Largest rise", "Evaluation", "Whole command"]  # fmt: skip
     cells = []
     for row in rows:
-        first = told(row, "start") + (", speed assumed" if row["said"]["start"]["speed"] == "assumed" else "")
+        speed = row["said"]["start"]["speed"]
+        first = told(row, "start") + (f", speed {speed}" if speed != "measured" else "")
         evaluation = duration(row["whole"] - row["trained"]) + " (former)" * ("blas_threads" not in row)
         cells.append(
-            [named(row), str(row["frames"]), first, today(row), told(row, "forecast"), told(row, "minute"),
+            [named(row), str(row["frames"]), first, told(row, "forecast"), told(row, "minute"),
              f"{row['largest_rise']:.0%}", evaluation, duration(row["whole"])]
         )  # fmt: skip
     return noted(heads, cells, about(rows))
@@ -87,17 +61,17 @@ def about(rows: list[dict[str, Any]]) -> str:
     sizes, clocks = sorted({row["size"] for row in rows}), sorted({CLOCKS[row["clock"]] for row in rows})
     machines = sorted({row["processor"] for row in rows})
     after = " or ".join(map(str, sorted({row.get("forecast_after", FORMERLY) for row in rows})))
-    several = any(row.get("passes", PASSES) > 1 for row in rows)
-    note = " It is of rows whose evaluation made one pass over the held-out frames; the others made three." * several
     former = (
-        " A *former* evaluation is of a command before the evaluation and the initial motion were changed; in these"
-        " rows *today* counts the evaluation as it was timed, and the motion as on one thread."
+        " A *former* evaluation is of a command before the evaluation and the initial motion were changed."
     ) * any("blas_threads" not in row for row in rows)
+    speeds = {row["said"]["start"]["speed"] for row in rows}
+    former += (" A speed that was *assumed* was the same for every machine; a few iterations are *timed* now.") * (
+        "assumed" in speeds
+    )
     return (
         f"Frames of {' and '.join(sizes)}, every eighth held out; {' and '.join(clocks)}; {', '.join(machines)}; "
         f"{max(row['date'] for row in rows)}. The forecast was printed after {after} iterations. The largest rise is "
-        "that of the time left over its smallest value before. *Today* is the first line with the present constants."
-        f"{note}{former}"
+        f"that of the time left over its smallest value before.{former}"
     )
 
 

@@ -68,11 +68,11 @@ def run(words: list[str]) -> int:
 
 def _speed(settings: Config) -> "Speed":
     """The speed of the last training on this machine with the threads of the settings, else the assumed one."""
-    from endotsr.clips.sequences.forecast.seconds import Speed, assumed_unit, vector_factor
+    from endotsr.clips.sequences.forecast.seconds import Speed, vector_factor
     from endotsr.method.kernels.threads import use_threads
     from endotsr.results.evaluation.lpips import lpips_file
-    from endotsr.training.runs.speed import remembered_beside, remembered_unit
+    from endotsr.training.runs.speed import known_speed
 
     threads = use_threads(settings.training.threads)
-    unit, perceived = remembered_unit(threads) or assumed_unit(threads), lpips_file() is not None
-    return Speed(unit, threads, perceived, vector_factor(), remembered_beside(threads))
+    found, perceived = known_speed(threads), lpips_file() is not None
+    return Speed(found.unit, threads, perceived, vector_factor(), found.beside)

@@ -3,6 +3,7 @@
 import math
 import shlex
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -216,12 +217,10 @@ def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Confi
     """The settings for the requested minutes, from a few timed iterations, and a line on them."""
     from endotsr.clips.sequences.forecast.seconds import vector_factor
     from endotsr.clips.sequences.forecast.work import GAUSSIANS, at_start, iteration_work
-    from endotsr.training.fitting.compile_ahead import compile_ahead
-    from endotsr.training.runs.pace import paced_for, seconds_of_unit
+    from endotsr.training.runs.pace import paced_for
 
     assert options.minutes is not None
-    compile_ahead(config, print)
-    unit = seconds_of_unit(sequence, config)
+    unit = _timed_unit(sequence, config)
     found = paced_for(options.minutes, sequence, config, unit, threads)
     pixels = sequence.width * sequence.height
     late = unit * float(iteration_work(GAUSSIANS, pixels, 1.0, vector_factor()))
@@ -230,6 +229,15 @@ def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Confi
         f"minutes: {options.minutes:g}; an iteration of 60 000 Gaussians takes {1e3 * late:.0f} ms: "
         f"{found.training.iterations} iterations, {gaussians} Gaussians"
     )
+
+
+def _timed_unit(sequence: "Sequence", config: Config) -> float:
+    """Seconds per unit of work, from a few iterations; compiles the kernels first, if that was not done."""
+    from endotsr.training.fitting.compile_ahead import compile_ahead
+    from endotsr.training.runs.pace import seconds_of_unit
+
+    compile_ahead(config, print)
+    return seconds_of_unit(sequence, config)
 
 
 def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequence", Progress]:
@@ -290,15 +298,16 @@ def _progress(
     from endotsr.results.report.live_page import LIVE_PAGE, LivePage
     from endotsr.training.fitting.compile_ahead import done_before
     from endotsr.training.runs.sources import SIMULATED
-    from endotsr.training.runs.speed import remembered_beside, remembered_unit
+    from endotsr.training.runs.speed import LEAST_PIXELS, known_speed
 
     frames, threads = frames_of(sequence.train_index, sequence.test_index), numba.get_num_threads()
     if source == SIMULATED or has_truth(Path(source)):
         frames = frames.with_true_motion()
     perceived = lpips_file(options.lpips) is not None if options.evaluate else None
-    pixels, beside = sequence.width * sequence.height, remembered_beside(threads)
-    plan = TimedCommand(config, frames, pixels, threads, perceived, vector_factor(), beside)
-    print(waiting_line(plan, remembered_unit(threads), done_before(config).exists(), at))
+    pixels = sequence.width * sequence.height
+    speed = known_speed(threads, partial(_timed_unit, sequence, config) if pixels >= LEAST_PIXELS else None)
+    plan = TimedCommand(config, frames, pixels, threads, perceived, vector_factor(), speed.beside)
+    print(waiting_line(plan, speed, done_before(config).exists(), at))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
     return Progress(plan, LivePage(folder, sequence, config))
 

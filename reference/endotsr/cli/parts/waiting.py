@@ -1,27 +1,20 @@
 """What a person waits for in `endotsr train`, in one line before the first iteration, also of a resumed training."""
 
-from endotsr.clips.sequences.forecast.seconds import (
-    COMPILATION,
-    MEASURED_SPEEDS,
-    TimedCommand,
-    assumed_unit,
-    estimated_seconds,
-)
+from endotsr.clips.sequences.forecast.seconds import COMPILATION, TimedCommand, estimated_seconds
 from endotsr.clips.sequences.forecast.work import Standing
 from endotsr.results.report.tables import duration
+from endotsr.training.runs.speed import KnownSpeed
 from endotsr.untrusted.names import counted
 
-UNKNOWN = "the speed of this machine is assumed; machines took {:.1f} to {:.1f} times as long".format(*MEASURED_SPEEDS)
 
-
-def waiting_line(plan: TimedCommand, unit: float | None, compiled: bool, at: Standing | None = None) -> str:
+def waiting_line(plan: TimedCommand, speed: KnownSpeed, compiled: bool, at: Standing | None = None) -> str:
     """The parts of the command after reading, with the time of each.
 
-    unit       seconds per unit of work in an earlier training on this machine; None = unknown
+    speed      of this machine, with the threads of the plan
     compiled   whether the kernels are in the cache
     at         progress of a training that is resumed; None = a new one
     """
-    found = estimated_seconds(plan, assumed_unit(plan.threads) if unit is None else unit, at)
+    found = estimated_seconds(plan, speed.unit, at)
     left = plan.config.training.iterations - (0 if at is None else at.iteration)
     steps = {
         "initial motion": found.start,
@@ -31,8 +24,7 @@ def waiting_line(plan: TimedCommand, unit: float | None, compiled: bool, at: Sta
         "evaluation": found.evaluation,
     }
     named = ", ".join(f"{name} {duration(seconds)}" for name, seconds in steps.items() if seconds >= 1)
-    known = "at the speed of the last training" if unit is not None else UNKNOWN
-    whole = f"about {in_words(sum(steps.values()))} for {counted(plan.frames.total, 'frame')} ({known})"
+    whole = f"about {in_words(sum(steps.values()))} for {counted(plan.frames.total, 'frame')} ({speed.source})"
     return f"{whole}: {named}" if named else whole
 
 

@@ -2,14 +2,17 @@
 
 A training stores its seconds per unit of work (`clips/sequences/forecast/work.py`) by its number of threads: of the
 iterations if it timed at least LEAST_ITERATIONS, of the initial motion and of the evaluation; each on frames of at
-least LEAST_PIXELS. Forecasts read them; no result depends on them.
+least LEAST_PIXELS. Before the first training a few iterations can be timed. Forecasts read the speed; no result depends
+on it.
 """
 
 import contextlib
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
-from endotsr.clips.sequences.forecast.seconds import Beside
+from endotsr.clips.sequences.forecast.seconds import MEASURED_SPEEDS, Beside, assumed_unit
 from endotsr.errors import InputError
 from endotsr.untrusted.json import number, read_json
 from endotsr.untrusted.writing import replace_text
@@ -17,6 +20,29 @@ from endotsr.untrusted.writing import replace_text
 LEAST_ITERATIONS, LEAST_PIXELS = 200, 80_000
 FASTEST, SLOWEST = 1e-4, 100.0  # seconds per unit; other numbers are no speed
 ITERATIONS, START, EVALUATION = "seconds_per_unit", "start_seconds_per_unit", "evaluation_seconds_per_unit"
+
+TRAINED = "at the speed of the last training"
+TIMED = "at the speed of a few iterations"
+ASSUMED = "the speed of this machine is assumed; machines took {:.1f} to {:.1f} times as long".format(*MEASURED_SPEEDS)
+
+
+class KnownSpeed(NamedTuple):
+    """What is known about the speed of a machine."""
+
+    unit: float  # seconds per unit of work of an iteration, with the threads asked for
+    beside: Beside
+    source: str  # TRAINED, TIMED or ASSUMED
+
+
+def known_speed(threads: int, timed: Callable[[], float] | None = None) -> KnownSpeed:
+    """The speed in the last training with these threads; without one, as timed now, or an assumed one.
+
+    timed   times a unit of work with these threads; None: too long for the command, or for the clip
+    """
+    unit, beside = remembered_unit(threads), remembered_beside(threads)
+    if unit is not None:
+        return KnownSpeed(unit, beside, TRAINED)
+    return KnownSpeed(timed(), beside, TIMED) if timed else KnownSpeed(assumed_unit(threads), beside, ASSUMED)
 
 
 def speed_file(threads: int) -> Path:
