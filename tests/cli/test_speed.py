@@ -1,7 +1,7 @@
 """The speed of the machine between trainings: kept only if enough was timed, and never in the way."""
 
 import pytest
-from tiny import train_words
+from tiny import train_words, written_folder
 
 from endotsr.cli.main import main
 from endotsr.cli.parts import waiting
@@ -71,3 +71,12 @@ def test_the_first_training_on_a_machine_times_iterations_of_a_large_clip(least,
     monkeypatch.setattr(pace, "seconds_of_unit", lambda sequence, config: timed.append(config) or 0.4321)
     assert main(train_words(tmp_path / "run", "--no-evaluate", "--iterations", "1")) == 0
     assert source in capsys.readouterr().out and len(timed) == (least == 1)
+
+
+def test_check_says_that_its_minutes_assume_a_speed(kept, tmp_path, capsys):
+    words = ["check", str(written_folder(tmp_path)), "--threads", "2"]
+    main(words)
+    assert f"({speed.ASSUMED})" in capsys.readouterr().out
+    speed.remember_unit(2, 0.1, 900, 90_000)
+    main(words)
+    assert "training needs about" in (said := capsys.readouterr().out) and "assumed" not in said

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.options import base_settings
@@ -10,9 +10,6 @@ from endotsr.cli.parts.parser import parse
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
 from endotsr.untrusted.names import counted
-
-if TYPE_CHECKING:
-    from endotsr.clips.sequences.forecast.seconds import Speed
 
 SHORT = ("sequence.scale", "sequence.frames", "sequence.masks", "training.threads")
 
@@ -41,11 +38,18 @@ def run(words: list[str]) -> int:
         raise InputError("check: SEQUENCE is missing: a sequence folder")
     from endotsr.cli.parts.waiting import in_words
     from endotsr.clips.sequences.checks.check import check_sequence
+    from endotsr.clips.sequences.forecast.seconds import Speed, vector_factor
+    from endotsr.method.kernels.threads import use_threads
+    from endotsr.results.evaluation.lpips import lpips_file
     from endotsr.results.report.check_page import check_page
     from endotsr.training.runs.files import write_json
+    from endotsr.training.runs.speed import ASSUMED, known_speed
     from endotsr.untrusted.writing import replace_text
 
-    checked = check_sequence(Path(options.sequence), options.settings, _speed(options.settings))
+    threads = use_threads(options.settings.training.threads)
+    speed = known_speed(threads)
+    of_machine = Speed(speed.unit, threads, lpips_file() is not None, vector_factor(), speed.beside)
+    checked = check_sequence(Path(options.sequence), options.settings, of_machine)
     for finding in checked.findings:
         print(f"{finding.level}: {finding.code}: {finding.line}")
     facts = checked.facts
@@ -55,7 +59,7 @@ def run(words: list[str]) -> int:
         print(
             f"{counted(facts.get('frames', 0), 'frame')} of {facts.get('width')}x{facts.get('height')}:"
             f" training needs about {cost['total_bytes'] / 1e9:.1f} GB and {whole} with the evaluation{fraction}"
-            f" and ends with about {cost['gaussians']} Gaussians"
+            f" and ends with about {cost['gaussians']} Gaussians" + (f" ({ASSUMED})" if speed.source == ASSUMED else "")
         )
     print(f"{options.sequence}: {'refused' if checked.refused else 'ready for training'}")
     if options.json is not None:
@@ -64,15 +68,3 @@ def run(words: list[str]) -> int:
     if options.html is not None:
         replace_text(options.html, check_page(checked))
     return 1 if checked.refused else 0
-
-
-def _speed(settings: Config) -> "Speed":
-    """The speed of the last training on this machine with the threads of the settings, else the assumed one."""
-    from endotsr.clips.sequences.forecast.seconds import Speed, vector_factor
-    from endotsr.method.kernels.threads import use_threads
-    from endotsr.results.evaluation.lpips import lpips_file
-    from endotsr.training.runs.speed import known_speed
-
-    threads = use_threads(settings.training.threads)
-    found, perceived = known_speed(threads), lpips_file() is not None
-    return Speed(found.unit, threads, perceived, vector_factor(), found.beside)
