@@ -17,6 +17,17 @@ def data_folder(name: str) -> Path:
     return folder
 
 
+def first_frames(clip: str, count: int, folder: Path) -> Path:
+    """A folder with the first frames of an EndoNeRF clip and their right views, or a skip."""
+    given = data_folder(clip)
+    for part in ("images", "images_right", "masks", "depth"):
+        (folder / part).mkdir(parents=True)
+        for file in sorted((given / part).iterdir())[:count]:
+            (folder / part / file.name).symlink_to(file)
+    np.save(folder / "poses_bounds.npy", np.load(given / "poses_bounds.npy")[:count])
+    return folder
+
+
 def recorded_masks(clip: str, folder: str) -> list[np.ndarray]:
     """The masks of a folder of an EndoNeRF clip, (H, W) each, True = tissue, or a skip."""
     from endotsr.clips.opencv.png import read_png

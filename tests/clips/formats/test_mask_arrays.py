@@ -11,14 +11,10 @@ TOOL = np.zeros((FRAMES, HEIGHT, WIDTH), bool)
 for _i in range(FRAMES):
     TOOL[_i, 4:12, 2 * _i : 2 * _i + 10] = True
 KINDS = {
-    "truth values": TOOL,
-    "0 and 255": TOOL.astype(np.uint8) * 255,
-    "0 and 1 as float32": TOOL.astype(np.float32),
-    "int64": TOOL.astype(np.int64),
-    "a channel axis": TOOL[:, None],
-    "0 and 40": TOOL.astype(np.uint8) * 40,
+    "truth values": TOOL, "0 and 255": TOOL.astype(np.uint8) * 255, "0 and 1 as float32": TOOL.astype(np.float32),
+    "int64": TOOL.astype(np.int64), "a channel axis": TOOL[:, None], "0 and 40": TOOL.astype(np.uint8) * 40,
     "16 bits": TOOL.astype(np.uint16) * 65535,
-}
+}  # fmt: skip
 
 
 def prepared(folder, *words):
@@ -63,19 +59,15 @@ def test_one_file_a_frame_and_one_for_all(tmp_path, capsys):
     assert "not read" not in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    "array, said",
-    [
-        (TOOL * 0.7, "holds 0.7; use whole numbers from 0 to 65535, or True and False; a threshold makes a mask"),
-        (TOOL * -1, "holds -1; use"),
-        (TOOL * 70_000, "holds 70000; use"),
-        (np.where(TOOL, np.nan, 0), "holds nan; use"),
-        (TOOL[:, :, :20], "20x24"),
-        (TOOL[:4], "1 of 5 frames have no mask"),
-        (TOOL[..., None].repeat(4, axis=3), "use one array of real numbers, (frames, height, width)"),
-    ],
-    ids=["probabilities", "negative", "too large", "NaN", "another shape", "too few frames", "colours"],
-)
+@pytest.mark.parametrize("array, said", [
+    (TOOL * 0.7, "holds 0.7; use whole numbers from 0 to 65535, or True and False; a threshold makes a mask"),
+    (TOOL * -1, "holds -1; use"),
+    (TOOL * 70_000, "holds 70000; use"),
+    (np.where(TOOL, np.nan, 0), "holds nan; use"),
+    (TOOL[:, :, :20], "20x24"),
+    (TOOL[:4], "1 of 5 frames have no mask"),
+    (TOOL[..., None].repeat(4, axis=3), "use one array of real numbers, (frames, height, width)"),
+], ids=["probabilities", "negative", "too large", "NaN", "another shape", "too few frames", "colours"])  # fmt: skip
 def test_what_is_no_mask_of_this_clip_is_refused(tmp_path, capsys, array, said):
     np.save(tmp_path / "m.npy", array)
     status, _ = prepared(tmp_path, "--masks", str(tmp_path / "m.npy"))

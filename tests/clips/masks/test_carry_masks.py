@@ -243,6 +243,7 @@ def rows_of_the_page(column: int) -> dict[int, tuple[float, float]]:
     return {key: (row[2 * column], row[2 * column + 1]) for key, row in cells.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.data
 @pytest.mark.parametrize(("clip", "column"), [("endonerf_pulling", 0), ("endonerf_cutting", 1)])
 def test_the_table_of_the_specification(clip, column):

@@ -142,17 +142,6 @@ def test_a_crop_needs_one_size(other):
         clip.depth(7) if other == "depth" else next(clip.pictures([7]))
 
 
-def test_a_cropped_clip_sees_the_same_world(tmp_path):
-    """A pixel of the crop is the same ray as before: the camera of the crop projects it there."""
-    written(tmp_path / "clip", poses=moving())
-    words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--crop", "4", "3", "20", "18"]
-    assert main(words) == 0
-    whole, part = describe(tmp_path / "clip"), describe(tmp_path / "o")
-    assert (part.intrinsics.cx, part.intrinsics.cy) == (whole.intrinsics.cx - 4, whole.intrinsics.cy - 3)
-    np.testing.assert_allclose(part.depth(2), whole.depth(2)[3:21, 4:24], atol=0.01)
-    assert (part.masks(2) == whole.masks(2)[3:21, 4:24]).all()
-
-
 def test_seconds_and_dropped_frames_of_a_video(tmp_path, capsys):
     write(tmp_path / "a.mkv", pictures(), milliseconds=UNEVEN)
     words = ["prepare", str(tmp_path / "a.mkv"), "--out", str(tmp_path / "o"), *CAMERA]

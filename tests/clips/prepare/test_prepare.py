@@ -36,17 +36,6 @@ def prepared(source, out, settings=PrepareSettings(), **options):  # noqa: B008
     return found, notes
 
 
-def test_a_folder_of_pictures_keeps_every_pixel(tmp_path):
-    (tmp_path / "clip").mkdir()
-    for i in range(4):
-        write_png(tmp_path / "clip" / f"shot_{i + 8}.png", scene_picture(i))
-    found, _ = prepared(tmp_path / "clip", tmp_path / "out", camera=CAMERA)
-    assert found.frames == 4 and found.depth is None and found.masks is None
-    for i in range(4):  # 8, 9, 10, 11: ordered by number
-        np.testing.assert_array_equal(read_png(tmp_path / f"out/images/{i:06d}.png"), scene_picture(i))
-    assert describe(tmp_path / "out").intrinsics == (*CAMERA, WIDTH, HEIGHT, ())
-
-
 def test_a_lossless_video_gives_the_pictures_it_was_made_of(tmp_path):
     write_video(tmp_path / "clip.avi", [scene_picture(i) for i in range(6)])
     settings = PrepareSettings(frames="1:6:2")
@@ -126,7 +115,8 @@ def test_pairs_whose_names_have_no_number(tmp_path, names):
     for k, name in enumerate(names):
         write_png(tmp_path / "clip" / f"{name}.png", scene_picture(k))
     found, _ = prepared(tmp_path / "clip", tmp_path / "out", camera=CAMERA, baseline=4.0)
-    assert found.frames == len(names) // 2
+    assert found.frames == len(names) // 2 and found.depth is None and found.masks is None
+    assert describe(tmp_path / "out").intrinsics == (*CAMERA, WIDTH, HEIGHT, ())
     for k in range(len(names)):
         place = tmp_path / "out" / ("images_right" if k % 2 else "images") / f"{k // 2:06d}.png"
         np.testing.assert_array_equal(read_png(place), scene_picture(k))

@@ -13,24 +13,12 @@ from endotsr.errors import InputError
 from synthetic_folder import write_synthetic_folder
 
 
-@pytest.mark.parametrize(
-    "values, levels",
-    [
-        ([0, 1], (0, 1, False)),
-        ([0], (0, 255, False)),
-        ([1], (0, 1, False)),
-        ([0, 255], (0, 255, False)),
-        ([255], (0, 255, False)),
-        ([16, 235], (16, 235, False)),
-        ([0, 2], (0, 2, False)),
-        ([1, 2], (1, 2, False)),
-        ([0, 65535], (0, 65535, False)),
-        ([254, 255], (0, 255, True)),
-        ([*range(11), 250, 255], (0, 255, True)),
-        ([*range(0, 256, 5)], (0, 255, True)),
-        ([0, 1, 2, 255], (0, 255, False)),
-    ],
-)
+@pytest.mark.parametrize("values, levels", [
+    ([0, 1], (0, 1, False)), ([0], (0, 255, False)), ([1], (0, 1, False)), ([0, 255], (0, 255, False)),
+    ([255], (0, 255, False)), ([16, 235], (16, 235, False)), ([0, 2], (0, 2, False)), ([1, 2], (1, 2, False)),
+    ([0, 65535], (0, 65535, False)), ([254, 255], (0, 255, True)), ([*range(11), 250, 255], (0, 255, True)),
+    ([*range(0, 256, 5)], (0, 255, True)), ([0, 1, 2, 255], (0, 255, False)),
+])  # fmt: skip
 def test_the_numbers_of_all_masks_decide(values, levels):
     assert levels_of(values, "masks") == MaskLevels(*levels)
 

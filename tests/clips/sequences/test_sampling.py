@@ -13,16 +13,10 @@ def test_even_frames_hold_both_ends(count, most, frames):
     assert even_frames(count, most) == frames
 
 
-@pytest.mark.parametrize(
-    ("flags", "runs", "longest"),
-    [
-        ("0110111", [(1, 3), (4, 7)], (4, 7)),
-        ("1100110", [(0, 2), (4, 6)], (0, 2)),
-        ("1", [(0, 1)], (0, 1)),
-        ("000", [], (0, 0)),
-        ("", [], (0, 0)),
-    ],
-)
+@pytest.mark.parametrize(("flags", "runs", "longest"), [
+    ("0110111", [(1, 3), (4, 7)], (4, 7)), ("1100110", [(0, 2), (4, 6)], (0, 2)), ("1", [(0, 1)], (0, 1)),
+    ("000", [], (0, 0)), ("", [], (0, 0)),
+])  # fmt: skip
 def test_runs_end_behind_their_last_entry_and_the_first_of_equal_ones_is_the_longest(flags, runs, longest):
     given = np.array([flag == "1" for flag in flags], bool)
     assert runs_of(given) == runs and longest_run(given) == longest

@@ -28,22 +28,12 @@ SMALL_STILL = with_effects(SMALL)
 
 # The size of every effect at which it does nothing.
 NOTHING = {
-    "breathing": {"amplitude": 0.0},
-    "pulsation": {"amplitude": 0.0},
-    "pull": {"amplitude": 0.0},
-    "exposure": {"amplitude": 0.0},
-    "brightening": {"amplitude": 0.0},
-    "highlights": {"strength": 0.0},
-    "noise": {"sigma": 0.0},
-    "cutting": {"start": 0.95, "stop": 1.0},
-    "bleeding": {"opacity": 0.0},
-    "second_light": {"strength": 0.0},
-    "shadows": {"strength": 0.0},
-    "smoke": {"density": 0.0},
-    "vignetting": {"amplitude": 0.0},
-    "auto_exposure": {"amplitude": 0.0},
-    "motion_blur": {"shutter": 0.0},
-}
+    "breathing": {"amplitude": 0.0}, "pulsation": {"amplitude": 0.0}, "pull": {"amplitude": 0.0},
+    "exposure": {"amplitude": 0.0}, "brightening": {"amplitude": 0.0}, "highlights": {"strength": 0.0},
+    "noise": {"sigma": 0.0}, "cutting": {"start": 0.95, "stop": 1.0}, "bleeding": {"opacity": 0.0},
+    "second_light": {"strength": 0.0}, "shadows": {"strength": 0.0}, "smoke": {"density": 0.0},
+    "vignetting": {"amplitude": 0.0}, "auto_exposure": {"amplitude": 0.0}, "motion_blur": {"shutter": 0.0},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("effect", NOTHING)

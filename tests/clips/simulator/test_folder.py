@@ -107,18 +107,12 @@ def test_the_named_scenes_stay_in_the_picture(name):
     check_scene(named_scene(name))
 
 
-@pytest.mark.parametrize(
-    ("name", "section", "key", "value"),
-    [
-        ("breathing", "breathing", "amplitude", 80.0),
-        ("breathing", "pulsation", "amplitude", 90.0),
-        ("pulling", "pull", "amplitude", 80.0),
-        ("pulling", "instrument", "travel", 0.5),
-        ("cutting", "cutting", "length", 80.0),
-        ("cutting", "bleeding", "radius", 30.0),
-        ("moving-camera", "camera_motion", "amplitude", 60.0),
-    ],
-)
+@pytest.mark.parametrize(("name", "section", "key", "value"), [
+    ("breathing", "breathing", "amplitude", 80.0), ("breathing", "pulsation", "amplitude", 90.0),
+    ("pulling", "pull", "amplitude", 80.0), ("pulling", "instrument", "travel", 0.5),
+    ("cutting", "cutting", "length", 80.0), ("cutting", "bleeding", "radius", 30.0),
+    ("moving-camera", "camera_motion", "amplitude", 60.0),
+])  # fmt: skip
 def test_what_leaves_the_field_of_view_is_refused_with_the_largest_allowed_value(name, section, key, value):
     settings = small(name)
     with pytest.raises(InputError, match=rf"{section}.{key} = {value:g} leaves .* use at most") as caught:

@@ -154,15 +154,10 @@ def pulling():
 
 
 @pytest.mark.data
-@pytest.mark.parametrize(
-    ("name", "full", "tissue", "tolerance"),
-    [
-        ("temporal_mean", 27.17, 25.39, 0.0101),
-        ("nearest_frame", 37.71, 35.92, 0.0101),
-        ("two_neighbours", 40.51, 38.73, 0.0101),
-        ("flow_interpolation", 41.59, 39.80, 0.05),
-    ],
-)
+@pytest.mark.parametrize(("name", "full", "tissue", "tolerance"), [
+    ("temporal_mean", 27.17, 25.39, 0.0101), ("nearest_frame", 37.71, 35.92, 0.0101),
+    ("two_neighbours", 40.51, 38.73, 0.0101), ("flow_interpolation", 41.59, 39.80, 0.05),
+])  # fmt: skip
 def test_known_figures_on_pulling(pulling, name, full, tissue, tolerance):
     render = baselines.BASELINES[name][1](pulling)
     pairs = [psnr_pair(render(i), pulling.images[i] / 255.0, pulling.masks[i]) for i in pulling.test_index]

@@ -208,6 +208,7 @@ def test_metrics_are_bitwise_equal_for_every_number_of_threads(threads):
         assert {key: row[key] for key in alone} == alone
 
 
+@pytest.mark.slow
 @pytest.mark.data
 def test_known_row_on_pulling_with_lpips():
     from endotsr.clips.sequences.read import read_sequence

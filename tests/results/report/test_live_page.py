@@ -139,17 +139,11 @@ def test_a_curve_without_a_value_that_the_axis_holds_is_no_chart(y):
     assert chart_svg("x", [ChartCurve("x", list(range(len(y))), y)], 3, logarithmic=True) == ""
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "labels"),
-    [
-        (30.0, 30.2, ["30", "30.05", "30.1", "30.15", "30.2"]),
-        (0.9981, 0.9993, ["0.9985", "0.999"]),
-        (-120.01, -119.99, ["-120.01", "-120", "-119.99"]),
-        (12000.0, 15000.0, ["12000", "13000", "14000", "15000"]),
-        (1.0, 7.0, ["2", "4", "6"]),
-        (5.0, 5.0, ["5"]),
-    ],
-)
+@pytest.mark.parametrize(("low", "high", "labels"), [
+    (30.0, 30.2, ["30", "30.05", "30.1", "30.15", "30.2"]), (0.9981, 0.9993, ["0.9985", "0.999"]),
+    (-120.01, -119.99, ["-120.01", "-120", "-119.99"]), (12000.0, 15000.0, ["12000", "13000", "14000", "15000"]),
+    (1.0, 7.0, ["2", "4", "6"]), (5.0, 5.0, ["5"]),
+])  # fmt: skip
 def test_each_grid_line_of_a_chart_has_its_own_label(low, high, labels):
     """With three digits, the lines at 30.05 and 30.1 dB had one label."""
     svg = chart_svg("x", [ChartCurve("x", [0.0, 1.0], [low, high])], 1)

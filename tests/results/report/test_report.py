@@ -163,20 +163,14 @@ def test_verdict_names_the_strongest_baseline(page):
     assert "0.75 dB below" in page and "blend of two" in page and "above 1 of 2 baselines" in page
 
 
-@pytest.mark.parametrize(
-    "blend, lpips, said",
-    [
-        (30.25, (None, None), ""),
-        (29.9, (0.02, 0.01), ""),
-        (30.26, (None, None), "Interpolation suffices {} reaches 30.26 dB on tissue, this model 30.25 dB."),
-        (
-            42.8,
-            (0.0366, 0.009),
-            "Interpolation suffices {} 42.80 dB on tissue, this model 30.25 dB (LPIPS 0.0090 and 0.0",
-        ),
-        (42.8, (0.009, 0.0366), "In PSNR, interpolation suffices {} this model 30.25 dB (LPIPS 0.0366 and 0.0090)."),
-    ],
-)
+@pytest.mark.parametrize("blend, lpips, said", [
+    (30.25, (None, None), ""),
+    (29.9, (0.02, 0.01), ""),
+    (30.26, (None, None), "Interpolation suffices {} reaches 30.26 dB on tissue, this model 30.25 dB."),
+    (42.8, (0.0366, 0.009),
+        "Interpolation suffices {} 42.80 dB on tissue, this model 30.25 dB (LPIPS 0.0090 and 0.0"),
+    (42.8, (0.009, 0.0366), "In PSNR, interpolation suffices {} this model 30.25 dB (LPIPS 0.0366 and 0.0090)."),
+])  # fmt: skip
 def test_the_page_says_where_interpolation_suffices(blend, lpips, said):
     """The rows of the report's own table decide: the blend against the model on tissue, and their LPIPS."""
     data = made_up_data()

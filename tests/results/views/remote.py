@@ -27,12 +27,8 @@ class Remote:
         to_browser, from_test = os.pipe()
         to_test, from_browser = os.pipe()
         words = [
-            browser(),
-            *FLAGS,
-            "--remote-debugging-pipe",
-            f"--user-data-dir={profile}",
-            "about:blank",
-        ]
+            browser(), *FLAGS, "--remote-debugging-pipe", f"--user-data-dir={profile}", "about:blank",
+        ]  # fmt: skip
 
         def connect() -> None:
             os.dup2(to_browser, 13)

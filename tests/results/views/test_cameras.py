@@ -84,24 +84,18 @@ def test_cameras_of_a_file_take_what_they_do_not_name_from_the_sequence(tmp_path
     assert (second.fx, second.fy, second.width) == (99.0, 52.0, 10)
 
 
-@pytest.mark.parametrize(
-    ("camera", "said"),
-    [
-        ({"translation": [1, 2, 3]}, "cameras[0]: its content: object missing required field `rotation`"),
-        (
-            GOOD | {"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]},
-            "rotation: the first three columns are not perp",
-        ),
-        (GOOD | {"rotation": np.diag([1.0, 1, -1]).tolist()}, "rotation: the first three columns are a mirror image"),
-        (GOOD | {"translation": [1, 2]}, "translation: expected `array` of length 3, got 2"),
-        (GOOD | {"translation": [1, 2, "x"]}, "translation"),
-        (GOOD | {"fx": -3}, "fx: expected `float` > 0.0"),
-        (GOOD | {"fx": [1]}, "fx: expected `float`, got `array`"),
-        (GOOD | {"width": 1e9}, "width: expected `int`"),
-        (GOOD | {"focal": 3}, "object contains unknown field `focal`"),
-        (7, "cameras[0]: int"),
-    ],
-)
+@pytest.mark.parametrize(("camera", "said"), [
+    ({"translation": [1, 2, 3]}, "cameras[0]: its content: object missing required field `rotation`"),
+    (GOOD | {"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}, "rotation: the first three columns are not perp"),
+    (GOOD | {"rotation": np.diag([1.0, 1, -1]).tolist()}, "rotation: the first three columns are a mirror image"),
+    (GOOD | {"translation": [1, 2]}, "translation: expected `array` of length 3, got 2"),
+    (GOOD | {"translation": [1, 2, "x"]}, "translation"),
+    (GOOD | {"fx": -3}, "fx: expected `float` > 0.0"),
+    (GOOD | {"fx": [1]}, "fx: expected `float`, got `array`"),
+    (GOOD | {"width": 1e9}, "width: expected `int`"),
+    (GOOD | {"focal": 3}, "object contains unknown field `focal`"),
+    (7, "cameras[0]: int"),
+])  # fmt: skip
 def test_cameras_that_cannot_be_used_are_refused(camera, said, tmp_path):
     with pytest.raises(InputError) as refused:
         read_cameras(write(tmp_path, camera), CAMERA)

@@ -144,13 +144,9 @@ def chunk(kind: str, content: bytes) -> bytes:
 def write_png_chunks(folder: Path, keys: Keys) -> None:
     """Pictures with a palette from these chunks, in the order of the format."""
     order = [
-        "IHDR",
-        *(name for name in keys if name not in ("IHDR", "PLTE", "tRNS", "IDAT", "IEND")),
-        "PLTE",
-        "tRNS",
-        "IDAT",
-        "IEND",
-    ]
+        "IHDR", *(name for name in keys if name not in ("IHDR", "PLTE", "tRNS", "IDAT", "IEND")), "PLTE", "tRNS",
+        "IDAT", "IEND",
+    ]  # fmt: skip
     data = b"".join(chunk(name, keys[name]) for name in order if keys.get(name) is not None)
     for k in range(2):
         (folder / f"{k}.png").write_bytes(b"\x89PNG\r\n\x1a\n" + data)

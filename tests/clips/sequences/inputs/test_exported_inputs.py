@@ -15,19 +15,10 @@ from endotsr.clips.sequences.checks.depth import depth_facts, mark_finding
 from endotsr.clips.sequences.pairing import paired
 
 
-@pytest.mark.parametrize(
-    ("centre", "factor"),
-    [
-        ((640.0, 512.0), ""),
-        ((597.5, 520.9), ""),
-        ((540.0, 430.0), ""),
-        ((320.0, 256.0), "0.5"),
-        ((426.7, 341.3), "0.667"),
-        ((960.0, 768.0), "1.5"),
-        ((1280.0, 1024.0), "2"),
-        ((320.0, 512.0), ""),
-    ],
-)
+@pytest.mark.parametrize(("centre", "factor"), [
+    ((640.0, 512.0), ""), ((597.5, 520.9), ""), ((540.0, 430.0), ""), ((320.0, 256.0), "0.5"),
+    ((426.7, 341.3), "0.667"), ((960.0, 768.0), "1.5"), ((1280.0, 1024.0), "2"), ((320.0, 512.0), ""),
+])  # fmt: skip
 def test_a_principal_point_of_another_picture_size_is_named_with_the_size(centre, factor):
     lens = Intrinsics(1035.0, 1035.0, centre[0], centre[1], 1280, 1024)
     (what,) = [found.what for found in intrinsics_findings(lens, "")] or [""]

@@ -16,17 +16,10 @@ from endotsr.clips.sequences.checks.depth import depth_facts, depth_findings
 from endotsr.clips.sequences.checks.frames import rate_findings
 
 
-@pytest.mark.parametrize(
-    ("size", "centre", "said"),
-    [
-        ((640, 512), (320.0, 256.0), False),
-        ((640, 512), (256.0, 320.0), True),
-        ((1280, 1024), (560.0, 540.0), False),
-        ((1280, 1024), (540.0, 610.0), True),
-        ((1920, 1080), (872.0, 472.0), False),
-        ((512, 512), (190.0, 256.0), False),
-    ],
-)
+@pytest.mark.parametrize(("size", "centre", "said"), [
+    ((640, 512), (320.0, 256.0), False), ((640, 512), (256.0, 320.0), True), ((1280, 1024), (560.0, 540.0), False),
+    ((1280, 1024), (540.0, 610.0), True), ((1920, 1080), (872.0, 472.0), False), ((512, 512), (190.0, 256.0), False),
+])  # fmt: skip
 def test_exchanged_numbers_of_the_principal_point_are_named(size, centre, said):
     found = intrinsics_findings(Intrinsics(569.0, 569.0, *centre, *size), "here")
     assert ["exchanged" in finding.what for finding in found] == [True] * said
