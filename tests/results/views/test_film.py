@@ -190,6 +190,18 @@ def test_a_film_without_loss_holds_its_pictures_bit_by_bit(tmp_path):
     assert all((a == b).all() for a, b in zip(read_video(tmp_path / "a.mp4"), pictures(3), strict=True))
 
 
+def test_the_same_pictures_give_the_same_film_whatever_memory_held_before(tmp_path):
+    """Of a width that is no multiple of 32 pixels; the memory between the films has other content each time."""
+    random = np.random.default_rng(0)
+    texture = np.kron(random.integers(0, 256, (24, 30, 3)), np.ones((8, 8, 1), np.int64)).astype(np.uint8)
+    found = set()
+    for k in range(12):
+        random.integers(0, 255, (k + 1) * 70_000, np.uint8)
+        film_file.write_video(tmp_path / "a.mp4", (np.roll(texture, 3 * i, axis=1) for i in range(24)), 25.0)
+        found.add((tmp_path / "a.mp4").read_bytes())
+    assert len(found) == 1
+
+
 def test_a_place_that_cannot_be_written_is_an_error_of_the_file_system(tmp_path):
     with pytest.raises(OSError):
         film_file.write_video(tmp_path / "none" / "a.mp4", pictures(2), 10.0)

@@ -27,8 +27,10 @@ class Encoder(NamedTuple):
     pixels: str = "yuv420p"
 
 
+# Macroblock trees of libx264 (FFmpeg 8.1) read memory that is not set where the width is no multiple of 32 pixels: the
+# same pictures gave 20 different files in 24 repetitions. A film without them is 7 % larger.
 H264 = (
-    Encoder("libx264", {"crf": "17", "preset": "medium"}),
+    Encoder("libx264", {"crf": "17", "preset": "medium", "x264-params": "mbtree=0"}),
     Encoder("h264_videotoolbox", {"q:v": "70"}),  # macOS
     Encoder("h264_mf", {"quality": "90"}),  # Windows
     Encoder("libopenh264", {"b": "12M"}),
