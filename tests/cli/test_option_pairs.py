@@ -71,18 +71,20 @@ def silent(
     out: Path,
     permitted: tuple[str, ...] = (),
     before: Path | None = None,
+    pairs: bool = True,
 ) -> list[str]:
     """The options that are without effect in silence, alone or beside another one.
 
     permitted   options that only permit something
     before      the folder that the command changes, see `outcome`
+    pairs       whether two of `options` stand beside one another, and not each beside those of `base` alone
     """
     nothing = outcome(base, out, before)
     assert nothing.code == 0, nothing.said
     alone = {name: outcome([*base, *words], out, before) for name, words in options.items()}
     found = [name for name, it in alone.items() if it.files == nothing.files and not _told(name, it)]
     read = [name for name in options if "does not read" not in alone[name].said]  # a layout refuses it in every pair
-    for a, b in itertools.combinations(read, 2):
+    for a, b in itertools.combinations(read, 2) if pairs else ():
         both = outcome([*base, *options[a], *options[b]], out, before)
         for one, other in ((a, b), (b, a)):
             if both.files == alone[other].files and not _told(one, both) and alone[one].files != nothing.files:
@@ -148,20 +150,20 @@ def _names(options: type) -> set[str]:
     return {field.name.removeprefix("--") for field in fields_of(options) if not field.positional}
 
 
-@pytest.mark.parametrize(("source", "stated", "left_out"), [
-    ("pair", "camera", ["calibration", "field-of-view"]),
-    ("pair", "calibration", ["camera", "field-of-view", "distortion"]),
-    ("a.mkv", "field-of-view", ["calibration", "camera"]),
-    ("colmap", None, []),
+@pytest.mark.parametrize(("source", "stated", "left_out", "pairs"), [
+    ("pair", "camera", ["calibration", "field-of-view"], True),
+    ("pair", "calibration", ["camera", "field-of-view", "distortion"], False),  # their pairs are those beside a camera
+    ("a.mkv", "field-of-view", ["calibration", "camera"], True),
+    ("colmap", None, [], True),
 ])  # fmt: skip
-def test_no_pair_of_options_of_prepare_is_silent(source, stated, left_out, tmp_path):
+def test_no_pair_of_options_of_prepare_is_silent(source, stated, left_out, pairs, tmp_path):
     """Without an option that excludes the one on which the source depends: that pair is in the relations."""
     made(tmp_path)
     options, out = prepare_options(tmp_path), tmp_path / "o"
     base = ["prepare", str(tmp_path / source), "--out", str(out), *(options.pop(stated) if stated else [])]
     for name in (*left_out, "stereo", "layout"):  # the values of the last two are the defaults of these sources
         options.pop(name, None)
-    assert silent(base, options, out, PERMISSIONS["prepare"]) == []
+    assert silent(base, options, out, PERMISSIONS["prepare"], pairs=pairs) == []
 
 
 def test_no_pair_of_options_of_depth_is_silent(tmp_path):

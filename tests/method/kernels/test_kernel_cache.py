@@ -42,12 +42,19 @@ def copy_package(folder: Path) -> None:
     shutil.copytree(PACKAGE, folder / "endotsr", ignore=shutil.ignore_patterns("__pycache__"))
 
 
-def test_an_edit_of_a_file_that_a_kernel_inlines_is_never_stale(tmp_path):
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory) -> tuple[Path, float]:
+    """A folder with the package and the kernels of `PROGRAM`, and what it prints. Tests change copies alone."""
+    folder = tmp_path_factory.mktemp("installed")
+    copy_package(folder)
+    return folder, answer(folder)
+
+
+def test_an_edit_of_a_file_that_a_kernel_inlines_is_never_stale(installed, tmp_path):
     """Numba itself looks only at the file that holds the kernel; here another one changes."""
-    copy_package(tmp_path)
-    before = answer(tmp_path)
-    assert before == answer(tmp_path)  # from the kept kernel
-    kept = set((tmp_path / "cache").rglob("*.nbi"))
+    kept, before = installed
+    shutil.copytree(kept, tmp_path, dirs_exist_ok=True)
+    kernels = set((tmp_path / "cache").rglob("*.nbi"))
     file = tmp_path / "endotsr" / "method" / "kernels" / "exponential.py"
     text = file.read_text(encoding="utf-8")
     assert text.count("+ np.float64(1)\n") == 1
@@ -55,19 +62,19 @@ def test_an_edit_of_a_file_that_a_kernel_inlines_is_never_stale(tmp_path):
     u = 0.81 / 1.0001
     scale = 2.0 ** np.trunc(-u * u / np.log(2))
     assert answer(tmp_path) - before == 2 * scale
-    assert kept and kept < set((tmp_path / "cache").rglob("*.nbi"))
+    assert kernels and kernels < set((tmp_path / "cache").rglob("*.nbi"))
 
 
-def test_another_installation_of_the_same_sources_compiles_nothing(tmp_path):
+def test_another_installation_of_the_same_sources_compiles_nothing(installed, tmp_path):
     """Another environment or clone has other paths and other times of its files."""
-    found = []
-    for name in ("one", "two"):
-        copy_package(tmp_path / name)
-        for file in (tmp_path / name).rglob("*.py"):
-            os.utime(file, (1e9, 1e9 + len(found)))
-        value = process(tmp_path / name, tmp_path / "cache").stdout
-        found.append((value, {file: file.stat().st_mtime_ns for file in (tmp_path / "cache").rglob("*.nb?")}))
-    assert found[0] == found[1] and found[0][1]
+    (kept, before), cache = installed, tmp_path / "cache"
+    shutil.copytree(kept / "cache", cache)
+    times = {file: file.stat().st_mtime_ns for file in cache.rglob("*.nb?")}
+    copy_package(tmp_path / "other")
+    for file in (tmp_path / "other").rglob("*.py"):
+        os.utime(file, (1e9, 1e9))
+    assert float(process(tmp_path / "other", cache).stdout) == before
+    assert times and times == {file: file.stat().st_mtime_ns for file in cache.rglob("*.nb?")}
 
 
 def test_a_chosen_folder_holds_the_kernels_of_every_version(folder):
@@ -75,23 +82,23 @@ def test_a_chosen_folder_holds_the_kernels_of_every_version(folder):
     assert kernel_folder() == folder / kernel_source_hash()
 
 
-def test_a_cache_that_cannot_be_written_is_said_and_none_grows_beside_the_sources(tmp_path):
+def test_a_cache_that_cannot_be_written_is_said_and_none_grows_beside_the_sources(installed, tmp_path):
     """Numba's own second choice is the folder of the source: a cache that knows nothing of other files."""
-    copy_package(tmp_path)
+    folder, value = installed
     (tmp_path / "no_folder").write_text("a file")
-    done = process(tmp_path, tmp_path / "no_folder")
-    assert float(done.stdout) == answer(tmp_path)
+    done = process(folder, tmp_path / "no_folder")
+    assert float(done.stdout) == value
     (line,) = done.stderr.splitlines()
     assert line.startswith(f"endotsr: warning: {tmp_path / 'no_folder'}") and "recompiled at every start" in line
     assert "set NUMBA_CACHE_DIR" in line
-    assert not list((tmp_path / "endotsr").rglob("*.nb?"))
+    assert not list((folder / "endotsr").rglob("*.nb?"))
 
 
-def test_kernels_that_numba_does_not_keep_are_compiled_and_used(tmp_path):
+def test_kernels_that_numba_does_not_keep_are_compiled_and_used(installed, tmp_path):
     """Without optimisation; Numba warns with the name of the file."""
-    copy_package(tmp_path)
-    plain = process(tmp_path, tmp_path / "cache", NUMBA_OPT="0")
-    assert float(plain.stdout) == answer(tmp_path)
+    folder, value = installed
+    plain = process(folder, tmp_path, NUMBA_OPT="0")
+    assert float(plain.stdout) == value
     assert "Cannot cache compiled function" in plain.stderr
 
 

@@ -19,6 +19,7 @@ from tiny_sweep import (
 )
 
 from endotsr.cli.main import main
+from endotsr.studies.sweeps import cluster as sweep_cluster
 
 pytest.importorskip("distributed", reason="Dask is not installed (pip install 'endotsr[cluster]')")
 
@@ -75,7 +76,8 @@ def test_a_killed_worker_loses_nothing_and_results_equal_the_local_pool(cluster,
     assert_same_checkpoints(out, local)
 
 
-def test_no_scheduler_is_one_line(capsys, tmp_path):
+def test_no_scheduler_is_one_line(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(sweep_cluster, "PATIENCE", 1.0)
     assert f"{NOWHERE}: no Dask scheduler answers; use " in refused(capsys, tmp_path, NOWHERE)
 
 
