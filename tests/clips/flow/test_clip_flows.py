@@ -35,14 +35,6 @@ def test_flows_are_those_of_the_pairs_rounded_to_a_step(folder, pictures):
     assert len(list(zip(motion.forward, range(9)))) == 3, "iteration ends"
 
 
-def test_a_second_call_computes_nothing_and_is_equal(folder, pictures, monkeypatch):
-    first = motion_of(pictures)
-    monkeypatch.setattr(clip_flows, "dense_flow", lambda *_: pytest.fail("computed again"))
-    second = motion_of(pictures)
-    assert np.array_equal(first.forward.levels, second.forward.levels)
-    assert np.array_equal(first.backward.levels, second.backward.levels)
-
-
 def test_another_picture_order_or_size_has_flows_of_its_own(folder, pictures):
     changed = [picture.copy() for picture in pictures]
     changed[2][5, 5, 0] ^= 1

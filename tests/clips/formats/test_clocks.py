@@ -17,8 +17,3 @@ def test_an_even_clock_counts_from_the_first_picture():
 @pytest.mark.parametrize("stamps", [[0.0], [0.0, np.nan, 0.2], [0.0, 0.0, 0.0]])
 def test_without_stamps_the_stated_rate_remains(stamps):
     assert clock_of(np.array(stamps), 30.0)[:2] == (None, 30.0)
-
-
-def test_dropped_frames_are_no_jump():
-    found = clock_of(EVEN + 0.3 * (np.arange(50) > 20), None)
-    assert found.remark == "" and found.times is not None

@@ -27,11 +27,6 @@ def test_a_line_is_found_though_a_third_of_the_points_is_wrong():
     assert fitted_line(r[: FEWEST - 1], depth[: FEWEST - 1]) is None and fitted_line(r * 0, depth) is None
 
 
-def test_no_depth_where_the_line_leaves_the_front_of_the_camera():
-    depth = StraightLine(1.0, 0.0).depth(np.array([[2.0, 0.0, -1.0, np.nan]]))
-    assert depth.tolist() == [[0.5, 0.0, 0.0, 0.0]]
-
-
 @pytest.mark.parametrize("kind", ["npy", "png"])
 def test_scale_and_shift_come_from_points_in_every_frame(kind, tmp_path, capsys):
     values = relative if kind == "npy" else lambda i: np.rint(900 * relative(i)).astype(np.uint16)
@@ -160,7 +155,8 @@ def test_a_clip_without_depth_is_told_the_ways_of_one_camera(tmp_path, capsys):
     assert main(["train", str(where), "--out", str(tmp_path / "r")]) == 2 and "--flat" in capsys.readouterr().err
 
 
-def test_a_value_that_is_not_finite_has_no_depth_within_assumed_limits_either():
+def test_no_depth_where_the_line_leaves_the_front_of_the_camera_or_a_value_is_not_finite():
+    assert StraightLine(1.0, 0.0).depth(np.array([[2.0, 0.0, -1.0, np.nan]])).tolist() == [[0.5, 0.0, 0.0, 0.0]]
     line = StraightLine(0.5, 0.1)
     r = np.array([[np.inf, -np.inf, np.nan, 1.0]])
     np.testing.assert_array_equal(line.depth(r, 4.0) > 0, [[False, False, False, True]])

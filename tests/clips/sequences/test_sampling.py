@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 
-from endotsr.clips.sequences.sampling import even_frames, longest_run, reduced_to, runs_of, sampling_step, sparse_step
-
-
-@pytest.mark.parametrize(
-    ("count", "most", "frames"), [(10, 4, [0, 3, 6, 9]), (3, 8, [0, 1, 2]), (9, 1, [4]), (1, 5, [0])]
-)
-def test_even_frames_hold_both_ends(count, most, frames):
-    assert even_frames(count, most) == frames
+from endotsr.clips.sequences.sampling import longest_run, reduced_to, runs_of, sampling_step, sparse_step
 
 
 @pytest.mark.parametrize(("flags", "runs", "longest"), [
