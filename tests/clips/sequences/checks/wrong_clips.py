@@ -1,6 +1,7 @@
 """Wrong inputs: what is done to the folder of a right clip, and the finding that names it."""
 
 import numpy as np
+from builders import builder
 
 from endotsr.clips.opencv.png import read_png, write_png
 
@@ -45,11 +46,9 @@ def exposure(image):
     return (image * 0.3).astype(np.uint8)
 
 
-def entry(row, column, value):
-    def change(rows):
-        rows[:, :15].reshape(-1, 3, 5)[:, row, column] = value
-
-    return change
+@builder
+def entry(rows, row, column, value):
+    rows[:, :15].reshape(-1, 3, 5)[:, row, column] = value
 
 
 def copied(folder, a, b, names=("images",)):

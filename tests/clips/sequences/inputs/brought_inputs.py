@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+from builders import builder
 from depth_folders import true_depth
 from input_kinds import (
     Row,
@@ -61,36 +62,27 @@ def moved(folder: Path) -> bool:
     )
 
 
-def trajectory_file(name: str, content: bytes = b"PK\3\4"):
+@builder
+def trajectory_file(folder: Path, name: str, content: bytes = b"PK\3\4") -> list[str]:
     """Pictures with a trajectory in a file of another kind."""
-
-    def make(folder: Path) -> list[str]:
-        (folder / name).write_bytes(content)
-        return folder_of(pictures(), "--trajectory", str(folder / name))(folder)
-
-    return make
+    (folder / name).write_bytes(content)
+    return folder_of(pictures(), "--trajectory", str(folder / name))(folder)
 
 
-def mask_files(save, ending: str):
+@builder
+def mask_files(folder: Path, save, ending: str) -> list[str]:
     """Masks that `save` writes; it gets the path and the plane."""
-
-    def make(folder: Path) -> list[str]:
-        (folder / "m").mkdir()
-        for i in range(12):
-            save(folder / "m" / f"{i:04d}{ending}", mask())
-        return [*folder_of(pictures())(folder), "--masks", str(folder / "m")]
-
-    return make
+    (folder / "m").mkdir()
+    for i in range(12):
+        save(folder / "m" / f"{i:04d}{ending}", mask())
+    return [*folder_of(pictures())(folder), "--masks", str(folder / "m")]
 
 
-def mask_file(name: str, save):
+@builder
+def mask_file(folder: Path, name: str, save) -> list[str]:
     """All masks in one file."""
-
-    def make(folder: Path) -> list[str]:
-        save(folder / name)
-        return [*folder_of(pictures())(folder), "--masks", str(folder / name)]
-
-    return make
+    save(folder / name)
+    return [*folder_of(pictures())(folder), "--masks", str(folder / name)]
 
 
 def by_object(folder: Path) -> list[str]:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import public_layouts
 import raw_sources
+from builders import builder
 from input_kinds import Row, calibrated, colmap, common, each, half_excluded, mask, masked, public, raw, trajectory
 from made_videos import HEIGHT, WIDTH
 
@@ -28,15 +29,12 @@ def small_label(plane: np.ndarray) -> np.ndarray:
     return found
 
 
-def scaled_depth(factor: float):
+@builder
+def scaled_depth(folder: Path, factor: float) -> bool:
     """The depth that was written is the true one times a factor."""
-
-    def check(folder: Path) -> bool:
-        entry = read_sequence_file(folder / "o").depth
-        found = read_png(folder / "o/depth/000002.png") * entry.scale
-        return bool(np.abs(found - factor * public_layouts.depth(2)).max() < 1.0)
-
-    return check
+    entry = read_sequence_file(folder / "o").depth
+    found = read_png(folder / "o/depth/000002.png") * entry.scale
+    return bool(np.abs(found - factor * public_layouts.depth(2)).max() < 1.0)
 
 
 def in_both_forms(raw: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import raw_sources
+from builders import builder
 from depth_folders import true_depth
 from input_kinds import (
     Row,
@@ -49,14 +50,12 @@ def steps_per_metre(steps: int, key: str = "DepthMapFactor"):
     return raw(raw_sources.tum, change=change)
 
 
-def median_depth(millimetres: float):
-    def check(folder: Path) -> bool:
-        entry = read_sequence_file(folder / "o").depth
-        return entry is not None and np.isclose(
-            np.median(read_png(folder / "o/depth/000000.png")) * entry.scale, millimetres, rtol=1e-3
-        )
-
-    return check
+@builder
+def median_depth(folder: Path, millimetres: float) -> bool:
+    entry = read_sequence_file(folder / "o").depth
+    return entry is not None and np.isclose(
+        np.median(read_png(folder / "o/depth/000000.png")) * entry.scale, millimetres, rtol=1e-3
+    )
 
 
 def beside_a_model(folder: Path) -> None:
@@ -69,29 +68,23 @@ def beside_a_model(folder: Path) -> None:
     (model / "cameras.txt").write_text("1 PINHOLE 128 96 100.0 101.0 64.0 48.0\n")
 
 
-def of_all_frames(planes, option: str, name=lambda k: f"{k}.png"):
+@builder
+def of_all_frames(folder: Path, planes, option: str, name=lambda k: f"{k}.png") -> list[str]:
     """One array for the clip, in the order of these names sorted as text."""
-
-    def make(folder: Path) -> list[str]:
-        files(folder, "clip", pictures())
-        for k, file in enumerate(sorted((folder / "clip").iterdir())):
-            file.rename(file.with_name(name(k)))
-        np.save(folder / "a.npy", np.stack([planes(k) for k in sorted(range(12), key=name)]))
-        return [*prepare("clip")(folder), option, str(folder / "a.npy")]
-
-    return make
+    files(folder, "clip", pictures())
+    for k, file in enumerate(sorted((folder / "clip").iterdir())):
+        file.rename(file.with_name(name(k)))
+    np.save(folder / "a.npy", np.stack([planes(k) for k in sorted(range(12), key=name)]))
+    return [*prepare("clip")(folder), option, str(folder / "a.npy")]
 
 
-def saved(save, ending: str):
+@builder
+def saved(folder: Path, save, ending: str) -> None:
     """Masks as files of another kind; `save` gets the path and the plane."""
-
-    def change(folder: Path) -> None:
-        for file in sorted(folder.iterdir()):
-            plane = read_png(file)
-            file.unlink()
-            save(file.with_suffix(ending), plane)
-
-    return change
+    for file in sorted(folder.iterdir()):
+        plane = read_png(file)
+        file.unlink()
+        save(file.with_suffix(ending), plane)
 
 
 def numbers(factor: float, blur: int = 0):

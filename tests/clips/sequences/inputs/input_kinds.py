@@ -13,6 +13,7 @@ from PIL import Image
 sys.path.insert(0, str(Path(__file__).parents[3]))
 import public_layouts
 import raw_sources
+from builders import builder
 from calibration_files import kalibr, ros
 from common_folder import written
 from depth_folders import recording as with_depth
@@ -45,15 +46,12 @@ class Outcome(NamedTuple):
     message: str
 
 
-def close(frames, tolerance=10.0):
+@builder
+def close(folder: Path, frames, tolerance=10.0) -> bool:
     """The written pictures are these."""
-
-    def check(folder: Path) -> bool:
-        files = sorted((folder / "o/images").iterdir())
-        apart = [np.abs(read_png(f).astype(int) - p.astype(int)).mean() for f, p in zip(files, frames, strict=True)]
-        return max(apart) < tolerance
-
-    return check
+    files = sorted((folder / "o/images").iterdir())
+    apart = [np.abs(read_png(f).astype(int) - p.astype(int)).mean() for f, p in zip(files, frames, strict=True)]
+    return max(apart) < tolerance
 
 
 def both(*checks):
@@ -71,80 +69,64 @@ def timed(milliseconds):
     )
 
 
-def size(width, height):
+@builder
+def size(folder: Path, width, height) -> bool:
     """The written size is this, and so is that of the camera."""
-
-    def check(folder: Path) -> bool:
-        camera, seen = read_sequence_file(folder / "o").camera, read_png(folder / "o/images/000000.png")
-        return (camera.width, camera.height) == (width, height) == (seen.shape[1], seen.shape[0])
-
-    return check
+    camera, seen = read_sequence_file(folder / "o").camera, read_png(folder / "o/images/000000.png")
+    return (camera.width, camera.height) == (width, height) == (seen.shape[1], seen.shape[0])
 
 
 def baseline(millimetres: float):
     return lambda folder: np.isclose(read_sequence_file(folder / "o").camera.baseline, millimetres, atol=1e-4)
 
 
-def sides(left, right, tolerance=12.0):
+@builder
+def sides(folder: Path, left, right, tolerance=12.0) -> bool:
     """The written pairs are these."""
-
-    def check(folder: Path) -> bool:
-        clip = describe(folder / "o")
-        return clip.count == len(left) == len(right) and all(
-            np.abs(pair.left.astype(int) - one).mean() <= tolerance
-            and np.abs(pair.right.astype(int) - other).mean() <= tolerance
-            for pair, one, other in zip(clip.pictures(list(range(clip.count))), left, right)
-        )
-
-    return check
+    clip = describe(folder / "o")
+    return clip.count == len(left) == len(right) and all(
+        np.abs(pair.left.astype(int) - one).mean() <= tolerance
+        and np.abs(pair.right.astype(int) - other).mean() <= tolerance
+        for pair, one, other in zip(clip.pictures(list(range(clip.count))), left, right)
+    )
 
 
 def prepare(name: str, *words: str, camera=CAMERA):
     return lambda folder: ["prepare", str(folder / name), "--out", str(folder / "o"), *camera, *words]
 
 
-def video(name: str, frames=None, *words: str, change=lambda path: None, **how):
+@builder
+def video(folder: Path, name: str, frames=None, *words: str, change=lambda path: None, **how) -> list[str]:
     """A video as the input of `prepare`."""
-
-    def make(folder: Path) -> list[str]:
-        write(folder / name, pictures() if frames is None else frames, **how)
-        change(folder / name)
-        return prepare(name, *words)(folder)
-
-    return make
+    write(folder / name, pictures() if frames is None else frames, **how)
+    change(folder / name)
+    return prepare(name, *words)(folder)
 
 
 def codec(kind: str, name: str, code: str, layout="yuv420p", **how) -> Row:
     return Row(f"video, {kind}", video(name, None, codec=code, layout=layout, **how), "right", "", close(pictures()))
 
 
-def cut(part: float, whole=None):
-    def change(path: Path) -> None:
-        data = path.read_bytes()
-        path.write_bytes(data[: int(len(data) * part)])
-
-    return change
+@builder
+def cut(path: Path, part: float, whole=None) -> None:
+    data = path.read_bytes()
+    path.write_bytes(data[: int(len(data) * part)])
 
 
-def folder_of(frames, *words: str, ending="png", change=lambda folder: None):
-    def make(folder: Path) -> list[str]:
-        files(folder, "clip", frames, ending)
-        change(folder)
-        return prepare("clip", *words)(folder)
-
-    return make
+@builder
+def folder_of(folder: Path, frames, *words: str, ending="png", change=lambda folder: None) -> list[str]:
+    files(folder, "clip", frames, ending)
+    change(folder)
+    return prepare("clip", *words)(folder)
 
 
-def pair(*words: str, names=("left", "right"), frames=None, change=lambda clip: None):
+@builder
+def pair(folder: Path, *words: str, names=("left", "right"), frames=None, change=lambda clip: None) -> list[str]:
     """The pictures of two cameras in two folders."""
-
-    def make(folder: Path) -> list[str]:
-        for name, shown in zip(names, frames or (pictures(), pictures())):
-            files(folder / "clip", name, shown)
-        change(folder / "clip")
-        return prepare("clip", "--baseline", "4", *words)(folder)
-
-    return make
+    for name, shown in zip(names, frames or (pictures(), pictures())):
+        files(folder / "clip", name, shown)
+    change(folder / "clip")
+    return prepare("clip", "--baseline", "4", *words)(folder)
 
 
 def named(name, frames=None):
@@ -157,14 +139,11 @@ def named(name, frames=None):
     return folder_of(frames or pictures(), change=change)
 
 
-def trajectory(lines: list[str] | bytes, *words: str):
+@builder
+def trajectory(folder: Path, lines: list[str] | bytes, *words: str) -> list[str]:
     """Pictures with a trajectory in a text file."""
-
-    def make(folder: Path) -> list[str]:
-        (folder / "t.txt").write_bytes(lines if isinstance(lines, bytes) else "\n".join(lines).encode())
-        return folder_of(pictures(), "--trajectory", str(folder / "t.txt"), *words)(folder)
-
-    return make
+    (folder / "t.txt").write_bytes(lines if isinstance(lines, bytes) else "\n".join(lines).encode())
+    return folder_of(pictures(), "--trajectory", str(folder / "t.txt"), *words)(folder)
 
 
 def masked(frames, *words: str, count=12, change=lambda folder: None):
@@ -248,14 +227,11 @@ def blank():
     return Image.new("RGB", (WIDTH, HEIGHT))
 
 
-def shortened(ending: str):
+@builder
+def shortened(folder: Path, ending: str) -> None:
     """The last twentieth of the fourth file is missing."""
-
-    def change(folder: Path) -> None:
-        converted(ending)(folder)
-        cut(0.95)(folder / f"clip/0003.{ending}")
-
-    return change
+    converted(ending)(folder)
+    cut(0.95)(folder / f"clip/0003.{ending}")
 
 
 def every_second_jpg(folder: Path) -> None:
@@ -265,24 +241,19 @@ def every_second_jpg(folder: Path) -> None:
         write_jpeg(file.with_suffix(".jpg"), pixels)
 
 
-def depth(values, *words, name="depth", kind="npy"):
-    def make(folder: Path) -> list[str]:
-        return [*with_depth(folder, values, name, kind), *words]
-
-    return make
+@builder
+def depth(folder: Path, values, *words, name="depth", kind="npy") -> list[str]:
+    return [*with_depth(folder, values, name, kind), *words]
 
 
-def depth_files(save, ending: str, *words: str):
+@builder
+def depth_files(folder: Path, save, ending: str, *words: str) -> list[str]:
     """True depth in files of another kind; `save` gets the path and the plane of a frame."""
-
-    def make(folder: Path) -> list[str]:
-        found = with_depth(folder, true_depth)
-        for i, file in enumerate(sorted((folder / "depth").iterdir())):
-            file.unlink()
-            save(file.with_suffix(ending), true_depth(i))
-        return [*found, *words]
-
-    return make
+    found = with_depth(folder, true_depth)
+    for i, file in enumerate(sorted((folder / "depth").iterdir())):
+        file.unlink()
+        save(file.with_suffix(ending), true_depth(i))
+    return [*found, *words]
 
 
 def depth_is_true(folder: Path) -> bool:
@@ -292,15 +263,12 @@ def depth_is_true(folder: Path) -> bool:
     )
 
 
-def raw(write_raw, *words: str, change=lambda folder: None, camera=()):
+@builder
+def raw(folder: Path, write_raw, *words: str, change=lambda folder: None, camera=()) -> list[str]:
     """A folder of another program in raw/, changed."""
-
-    def make(folder: Path) -> list[str]:
-        write_raw(folder / "raw")
-        change(folder / "raw")
-        return prepare("raw", *words, camera=camera)(folder)
-
-    return make
+    write_raw(folder / "raw")
+    change(folder / "raw")
+    return prepare("raw", *words, camera=camera)(folder)
 
 
 def public(layout: str, *words: str, change=lambda folder: None, **how):
@@ -319,16 +287,13 @@ def centred(folder: Path) -> bool:
     return abs(camera.cx - WIDTH / 2) < 1e-3 and abs(camera.cy - HEIGHT / 2) < 1e-3
 
 
-def calibrated(name: str, text: str, *words: str, folders=()):
+@builder
+def calibrated(folder: Path, name: str, text: str, *words: str, folders=()) -> list[str]:
     """Pictures in clip/, or in these folders of it, with a calibration of another program."""
-
-    def make(folder: Path) -> list[str]:
-        for place in folders or (".",):
-            files(folder / "clip", place, pictures())
-        (folder / name).write_text(text)
-        return prepare("clip", "--calibration", str(folder / name), *words, camera=())(folder)
-
-    return make
+    for place in folders or (".",):
+        files(folder / "clip", place, pictures())
+    (folder / name).write_text(text)
+    return prepare("clip", "--calibration", str(folder / name), *words, camera=())(folder)
 
 
 def ros_text(**changes) -> str:
@@ -350,35 +315,26 @@ camera_matrix: !!opencv-matrix
 """
 
 
-def common(*words: str, command="check", change=lambda clip: None, **changes):
+@builder
+def common(folder: Path, *words: str, command="check", change=lambda clip: None, **changes) -> list[str]:
     """A folder in the common format."""
-
-    def make(folder: Path) -> list[str]:
-        written(folder / "clip", **changes)
-        change(folder / "clip")
-        return [command, str(folder / "clip"), *words]
-
-    return make
+    written(folder / "clip", **changes)
+    change(folder / "clip")
+    return [command, str(folder / "clip"), *words]
 
 
-def with_files(*names: str):
+@builder
+def with_files(folder: Path, *names: str) -> None:
     """Further files in a folder."""
-
-    def change(folder: Path) -> None:
-        for name in names:
-            (folder / name).parent.mkdir(exist_ok=True)
-            (folder / name).write_text("1")
-
-    return change
+    for name in names:
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text("1")
 
 
-def reworded(name: str, change):
+@builder
+def reworded(folder: Path, name: str, change) -> None:
     """A text file of a folder, changed."""
-
-    def done(folder: Path) -> None:
-        (folder / name).write_text(change((folder / name).read_text()))
-
-    return done
+    (folder / name).write_text(change((folder / name).read_text()))
 
 
 def first_to_last(first: int, last: int | None = None, step: int = 1):
@@ -411,9 +367,7 @@ def tiff(path: Path, plane: np.ndarray, black_is_zero: int = 1, bits: int = 16, 
     )
 
 
-def each(name, change):
-    def done(clip: Path) -> None:
-        for file in sorted((clip / name).iterdir()):
-            write_png(file, change(read_png(file)))
-
-    return done
+@builder
+def each(clip: Path, name, change) -> None:
+    for file in sorted((clip / name).iterdir()):
+        write_png(file, change(read_png(file)))

@@ -22,6 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 sys.path.insert(0, str(Path(__file__).parents[3]))
 import one_view
 from brought_inputs import BROUGHT_ROWS
+from builders import builder
 from careless_inputs import CARELESS_ROWS
 from depth_folders import WRONG as NO_LENGTHS
 from depth_folders import true_depth
@@ -99,15 +100,12 @@ DEINTERLACED = [picture(2 * i) for i in range(12)]
 STEREO = [np.hstack([p, p]) for p in pictures()]
 
 
-def deinterlaced(frames):
+@builder
+def deinterlaced(folder: Path, frames) -> bool:
     """The written pictures are these, and no row of another moment stands between two others."""
-
-    def check(folder: Path) -> bool:
-        red = [read_png(file)[..., 0].astype(int) for file in sorted((folder / "o/images").iterdir())]
-        combs = [np.abs(shown[2:-1:2] - (shown[1:-2:2] + shown[3::2]) / 2).mean() for shown in red]
-        return close(frames, 8.0)(folder) and max(combs) < 3.4  # 2.4 deinterlaced, 4.5 as stored
-
-    return check
+    red = [read_png(file)[..., 0].astype(int) for file in sorted((folder / "o/images").iterdir())]
+    combs = [np.abs(shown[2:-1:2] - (shown[1:-2:2] + shown[3::2]) / 2).mean() for shown in red]
+    return close(frames, 8.0)(folder) and max(combs) < 3.4  # 2.4 deinterlaced, 4.5 as stored
 
 
 def turned_clockwise(degrees: int):
@@ -149,36 +147,30 @@ def two_streams(folder: Path) -> list[str]:
     return prepare("a.mkv")(folder)
 
 
-def high_definition(tagged: bool):
+@builder
+def high_definition(folder: Path, tagged: bool) -> list[str]:
     """Pictures of 1280x720 with the matrix of BT.709, which the file states or not."""
-
-    def make(folder: Path) -> list[str]:
-        with av.open(str(folder / "a.mp4"), "w") as container:
-            stream = container.add_stream("libx264", rate=25, options={"qp": "4"})
-            stream.width, stream.height, stream.pix_fmt = 1280, 720, "yuv420p"
-            if tagged:
-                stream.codec_context.colorspace = 1
-            for i in range(3):
-                frame = av.VideoFrame.from_ndarray(picture(i, 1280, 720), format="rgb24")
-                frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709")
-                frame.pts = i
-                container.mux(stream.encode(frame))
-            container.mux(stream.encode())
-        return prepare("a.mp4")(folder)
-
-    return make
+    with av.open(str(folder / "a.mp4"), "w") as container:
+        stream = container.add_stream("libx264", rate=25, options={"qp": "4"})
+        stream.width, stream.height, stream.pix_fmt = 1280, 720, "yuv420p"
+        if tagged:
+            stream.codec_context.colorspace = 1
+        for i in range(3):
+            frame = av.VideoFrame.from_ndarray(picture(i, 1280, 720), format="rgb24")
+            frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709")
+            frame.pts = i
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return prepare("a.mp4")(folder)
 
 
-def one_camera(values, *words, points=0):
+@builder
+def one_camera(folder: Path, values, *words, points=0) -> list[str]:
     """A clip from one camera with the files of a network, and true depth at some points beside it."""
-
-    def make(folder: Path) -> list[str]:
-        where, given = one_view.clip(folder, values)
-        if points:
-            one_view.sparse(where, points)
-        return ["depth", str(where), "--given", str(given), "--kind", "relative", *words]
-
-    return make
+    where, given = one_view.clip(folder, values)
+    if points:
+        one_view.sparse(where, points)
+    return ["depth", str(where), "--given", str(given), "--kind", "relative", *words]
 
 
 def frozen(clip: Path) -> None:
@@ -196,25 +188,21 @@ def view_is_kept(folder: Path) -> bool:
     return all(0.3 < (read_png(file) > 0).mean() < 0.8 for file in (folder / "o/masks").iterdir())
 
 
-def exported(name: str, *words: str):
-    def make(folder: Path) -> list[str]:
-        sys.path.insert(0, str(Path(__file__).parents[3] / "results" / "export"))
-        from made_up_model import moving_scene
+@builder
+def exported(folder: Path, name: str, *words: str) -> list[str]:
+    sys.path.insert(0, str(Path(__file__).parents[3] / "results" / "export"))
+    from made_up_model import moving_scene
 
-        from endotsr.results.export.files import export
+    from endotsr.results.export.files import export
 
-        export(moving_scene(), folder / "a.npz")
-        return ["export", str(folder / "a.npz"), "--out", str(folder / name), *words]
-
-    return make
+    export(moving_scene(), folder / "a.npz")
+    return ["export", str(folder / "a.npz"), "--out", str(folder / name), *words]
 
 
-def text_file(name: str, content: bytes):
-    def make(folder: Path) -> list[str]:
-        (folder / name).write_bytes(content)
-        return prepare(name)(folder)
-
-    return make
+@builder
+def text_file(folder: Path, name: str, content: bytes) -> list[str]:
+    (folder / name).write_bytes(content)
+    return prepare(name)(folder)
 
 
 def joined(folder: Path) -> list[str]:
@@ -398,7 +386,7 @@ ROWS = [
         "points of the prior depth", centred),
     Row("calibration, ROS", calibrated("a.yaml", ros_text()), "told", "half a pixel was added", centred),
     Row("calibration, ROS, fisheye", calibrated("a.yaml", ros_text(distortion_model="equidistant")), "refused",
-        "use one of plumb_bob"),
+        "use plumb_bob or rational_polynomial"),
     Row("calibration, Kalibr", calibrated("a.yaml", kalibr_text()), "told", "half a pixel was added", centred),
     Row("calibration, Kalibr, of another size", calibrated("a.yaml", kalibr_text(resolution=[128, 128])),
         "refused", "the calibration is of 128x128"),

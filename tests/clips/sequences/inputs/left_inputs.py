@@ -2,11 +2,14 @@
 
 import json
 import shutil
+import tempfile
+from functools import cache
 from pathlib import Path
 
 import av
 import cv2
 import numpy as np
+from builders import builder
 from input_kinds import (
     Row,
     both,
@@ -55,36 +58,30 @@ def two_models(raw: Path) -> None:
     shutil.rmtree(raw / "whole")
 
 
-def moved(pictures: str, model: str):
+@builder
+def moved(raw: Path, pictures: str, model: str) -> None:
     """Pictures and model in other places."""
-
-    def change(raw: Path) -> None:
-        (raw / "images").rename(raw / "p")
-        (raw / "sparse/0").rename(raw / "m")
-        shutil.rmtree(raw / "sparse")
-        for name, place in (("p", pictures), ("m", model)):
-            (raw / place).parent.mkdir(parents=True, exist_ok=True)
-            (raw / name).rename(raw / place)
-
-    return change
+    (raw / "images").rename(raw / "p")
+    (raw / "sparse/0").rename(raw / "m")
+    shutil.rmtree(raw / "sparse")
+    for name, place in (("p", pictures), ("m", model)):
+        (raw / place).parent.mkdir(parents=True, exist_ok=True)
+        (raw / name).rename(raw / place)
 
 
-def cameras(*factors: float):
+@builder
+def cameras(raw: Path, *factors: float) -> None:
     """One camera per picture, with these factors of the focal length."""
-
-    def change(raw: Path) -> None:
-        model = raw / "sparse/0"
-        (model / "cameras.txt").write_text(
-            "".join(f"{k + 1} PINHOLE 64 48 {60 * f} {61 * f} 30.0 25.0\n" for k, f in enumerate(factors))
-        )
-        lines = (model / "images.txt").read_text().splitlines()
-        for k in range(0, len(lines), 2):
-            words = lines[k].split()
-            words[8] = str(k // 2 % len(factors) + 1)
-            lines[k] = " ".join(words)
-        (model / "images.txt").write_text("\n".join(lines) + "\n")
-
-    return change
+    model = raw / "sparse/0"
+    (model / "cameras.txt").write_text(
+        "".join(f"{k + 1} PINHOLE 64 48 {60 * f} {61 * f} 30.0 25.0\n" for k, f in enumerate(factors))
+    )
+    lines = (model / "images.txt").read_text().splitlines()
+    for k in range(0, len(lines), 2):
+        words = lines[k].split()
+        words[8] = str(k // 2 % len(factors) + 1)
+        lines[k] = " ".join(words)
+    (model / "images.txt").write_text("\n".join(lines) + "\n")
 
 
 def both_sides(raw: Path) -> None:
@@ -128,10 +125,18 @@ COLMAP_ROWS = [
 ]  # fmt: skip
 
 
-def moving(folder: Path) -> None:
-    """A clip of a moving scope; its poses stay in true.npy."""
+@cache
+def moving_clip() -> tempfile.TemporaryDirectory:
+    """A clip of a moving scope, which is simulated once."""
+    kept = tempfile.TemporaryDirectory()
     size = ["--width", "160", "--height", "128", "--frames", "14"]
-    assert main(["simulate", "moving-camera", "--out", str(folder / "clip"), *size, "-q"]) == 0
+    assert main(["simulate", "moving-camera", "--out", f"{kept.name}/clip", *size, "-q"]) == 0
+    return kept
+
+
+def moving(folder: Path) -> None:
+    """A copy of this clip; its poses stay in true.npy."""
+    shutil.copytree(f"{moving_clip().name}/clip", folder / "clip")
     np.save(folder / "true.npy", np.load(folder / "clip/poses_bounds.npy")[:, :15])
 
 
@@ -146,12 +151,10 @@ def llff(folder: Path) -> None:
     np.save(folder / "clip/poses_bounds.npy", rows)
 
 
-def llff_prepared(*words: str):
-    def make(folder: Path) -> list[str]:
-        llff(folder)
-        return prepare("clip", *words, camera=())(folder)
-
-    return make
+@builder
+def llff_prepared(folder: Path, *words: str) -> list[str]:
+    llff(folder)
+    return prepare("clip", *words, camera=())(folder)
 
 
 def llff_trained(folder: Path) -> list[str]:
@@ -240,16 +243,13 @@ DEPTH_ROWS = [
 MOVED = [np.roll(shown, -5, axis=1) for shown in pictures()]
 
 
-def two_videos(*words: str, names=("left.mkv", "right.mkv"), right=MOVED):
+@builder
+def two_videos(folder: Path, *words: str, names=("left.mkv", "right.mkv"), right=MOVED) -> list[str]:
     """A folder with a video of each camera."""
-
-    def make(folder: Path) -> list[str]:
-        (folder / "clip").mkdir()
-        for name, frames in zip(names, (pictures(), right)):
-            write(folder / "clip" / name, frames, codec="ffv1", layout="bgr0")
-        return prepare("clip", "--baseline", "4", *words)(folder)
-
-    return make
+    (folder / "clip").mkdir()
+    for name, frames in zip(names, (pictures(), right)):
+        write(folder / "clip" / name, frames, codec="ffv1", layout="bgr0")
+    return prepare("clip", "--baseline", "4", *words)(folder)
 
 
 def second_video(folder: Path) -> list[str]:
@@ -270,15 +270,12 @@ def two_folders(left: str, right: str):
 pairs_kept = sides(pictures(), MOVED, 0)
 
 
-def renamed_video(name: str, **how):
+@builder
+def renamed_video(folder: Path, name: str, **how) -> list[str]:
     """A video under a name that does not end like one."""
-
-    def make(folder: Path) -> list[str]:
-        write(folder / f"a.{how.pop('kind')}", pictures(), **how)
-        next(folder.glob("a.*")).rename(folder / name)
-        return prepare(name)(folder)
-
-    return make
+    write(folder / f"a.{how.pop('kind')}", pictures(), **how)
+    next(folder.glob("a.*")).rename(folder / name)
+    return prepare(name)(folder)
 
 
 PAIR_ROWS = [
@@ -304,17 +301,14 @@ def matrices(folder: Path) -> np.ndarray:
     return np.concatenate([true[:, :, :3] * [1.0, -1.0, -1.0], true[:, :, 3:4]], axis=2)
 
 
-def with_poses(name: str, rows, write_rows):
+@builder
+def with_poses(folder: Path, name: str, rows, write_rows) -> list[str]:
     """Pictures and depth of a moving scope with its trajectory in another form."""
-
-    def make(folder: Path) -> list[str]:
-        write_rows(folder / name, rows(matrices(folder)))
-        clip = folder / "clip"
-        lens = ("--camera", *map(str, lens_of(clip)))
-        words = ["--trajectory", str(folder / name), "--trajectory-unit", "mm", "--depth", str(clip / "depth")]
-        return prepare("clip/images", *words, camera=lens)(folder)
-
-    return make
+    write_rows(folder / name, rows(matrices(folder)))
+    clip = folder / "clip"
+    lens = ("--camera", *map(str, lens_of(clip)))
+    words = ["--trajectory", str(folder / name), "--trajectory-unit", "mm", "--depth", str(clip / "depth")]
+    return prepare("clip/images", *words, camera=lens)(folder)
 
 
 def lens_of(clip: Path) -> tuple[float, ...]:

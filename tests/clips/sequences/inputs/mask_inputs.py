@@ -4,6 +4,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+from builders import builder
 from input_kinds import Row, folder_of, half_excluded, mask, masked, rewritten
 from made_videos import HEIGHT, WIDTH, pictures, write
 
@@ -39,43 +40,34 @@ def smooth() -> np.ndarray:
     return np.clip(255 * (30.5 - np.hypot(x - 50, y - 40)) / 2, 0, 255).astype(np.uint8)
 
 
-def as_read(frames: list[np.ndarray]):
+@builder
+def as_read(folder: Path, frames: list[np.ndarray]) -> bool:
     """The written masks exclude what is brighter than the middle, and nothing in a frame without an instrument."""
-
-    def check(folder: Path) -> bool:
-        found = [read_png(file) > 0 for file in sorted((folder / "o/masks").iterdir())]
-        apart = [np.mean(one != (frame >= 128)) for one, frame in zip(found, frames, strict=True)]
-        return max(apart) < 0.03 and not any(found[i].any() for i in EMPTY if not (frames[i] >= 128).any())
-
-    return check
+    found = [read_png(file) > 0 for file in sorted((folder / "o/masks").iterdir())]
+    apart = [np.mean(one != (frame >= 128)) for one, frame in zip(found, frames, strict=True)]
+    return max(apart) < 0.03 and not any(found[i].any() for i in EMPTY if not (frames[i] >= 128).any())
 
 
 def jpg(folder: Path) -> None:
     rewritten(folder, ending="jpg", quality=30)
 
 
-def of_video(frames: list[np.ndarray], *words: str, name: str = "m.mp4", **how):
+@builder
+def of_video(folder: Path, frames: list[np.ndarray], *words: str, name: str = "m.mp4", **how) -> list[str]:
     """The masks as a video."""
-
-    def make(folder: Path) -> list[str]:
-        write(folder / name, [np.repeat(frame[..., None], 3, axis=2) for frame in frames], **how)
-        return [*folder_of(pictures())(folder), "--masks", str(folder / name), *words]
-
-    return make
+    write(folder / name, [np.repeat(frame[..., None], 3, axis=2) for frame in frames], **how)
+    return [*folder_of(pictures())(folder), "--masks", str(folder / name), *words]
 
 
-def exported(frames: list[np.ndarray]):
+@builder
+def exported(folder: Path, frames: list[np.ndarray]) -> list[str]:
     """The masks as pictures that were exported from a video of them."""
-
-    def make(folder: Path) -> list[str]:
-        words = of_video(frames, options={"crf": "38"})(folder)
-        (folder / "m").mkdir()
-        with av.open(str(folder / "m.mp4")) as container:
-            for i, frame in enumerate(container.decode(video=0)):
-                write_png(folder / "m" / f"{i:04d}.png", frame.to_ndarray(format="rgb24"))
-        return [str(folder / "m") if word == str(folder / "m.mp4") else word for word in words]
-
-    return make
+    words = of_video(frames, options={"crf": "38"})(folder)
+    (folder / "m").mkdir()
+    with av.open(str(folder / "m.mp4")) as container:
+        for i, frame in enumerate(container.decode(video=0)):
+            write_png(folder / "m" / f"{i:04d}.png", frame.to_ndarray(format="rgb24"))
+    return [str(folder / "m") if word == str(folder / "m.mp4") else word for word in words]
 
 
 def void() -> np.ndarray:
@@ -89,18 +81,15 @@ def mixed_depth(folder: Path) -> None:
     write_png(folder / "0003.png", mask().astype(np.uint16) * 257)
 
 
-def with_tool(masks: list[np.ndarray], *words: str):
+@builder
+def with_tool(folder: Path, masks: list[np.ndarray], *words: str) -> list[str]:
     """Red tissue and a grey instrument in the left columns, with these masks."""
-
-    def make(folder: Path) -> list[str]:
-        words_of = masked(masks, *words)(folder)
-        for file in (folder / "clip").iterdir():
-            pixels = read_png(file).copy()
-            pixels[:, :40] = pixels[:, :40].mean(axis=2, keepdims=True)
-            write_png(file, pixels)
-        return words_of
-
-    return make
+    words_of = masked(masks, *words)(folder)
+    for file in (folder / "clip").iterdir():
+        pixels = read_png(file).copy()
+        pixels[:, :40] = pixels[:, :40].mean(axis=2, keepdims=True)
+        write_png(file, pixels)
+    return words_of
 
 
 HARD = with_empty([mask()] * 12, lambda i: mask(0))

@@ -4,6 +4,7 @@ import struct
 from pathlib import Path
 
 import numpy as np
+from builders import builder
 from input_kinds import Row, baseline, centred, depth_files, depth_is_true, files, prepare
 from left_inputs import MOVED
 from made_videos import pictures
@@ -67,17 +68,14 @@ def saved(variables, **how):
     return lambda path: savemat(path, variables, **how)
 
 
-def mat(write, *words: str, pair: bool = False, name: str = "calibration.mat"):
+@builder
+def mat(folder: Path, write, *words: str, pair: bool = False, name: str = "calibration.mat") -> list[str]:
     """Pictures, or pairs of pictures, with a calibration in a MAT-file."""
-
-    def make(folder: Path) -> list[str]:
-        files(folder, "one", pictures())
-        files(folder, "other", MOVED)
-        write(folder / name)
-        right = ("--right", str(folder / "other")) if pair else ()
-        return prepare("one", *right, "--calibration", str(folder / name), *words, camera=())(folder)
-
-    return make
+    files(folder, "one", pictures())
+    files(folder, "other", MOVED)
+    write(folder / name)
+    right = ("--right", str(folder / "other")) if pair else ()
+    return prepare("one", *right, "--calibration", str(folder / name), *words, camera=())(folder)
 
 
 def depth_in_mat(frames: int = 1):

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import public_layouts
 import raw_sources
+from builders import builder
 from depth_folders import true_depth
 from input_kinds import (
     Row,
@@ -55,12 +56,10 @@ def gif(folder: Path) -> list[str]:
     return prepare("a.gif")(folder)
 
 
-def with_camera(*camera):
-    def make(folder: Path) -> list[str]:
-        files(folder, "clip", pictures())
-        return prepare("clip", camera=("--camera", *camera))(folder)
-
-    return make
+@builder
+def with_camera(folder: Path, *camera) -> list[str]:
+    files(folder, "clip", pictures())
+    return prepare("clip", camera=("--camera", *camera))(folder)
 
 
 def exchanged(folder: Path) -> list[str]:
@@ -78,15 +77,12 @@ def exchanged(folder: Path) -> list[str]:
     return ["depth", str(folder / "o")]
 
 
-def marked(value, part=HOLE):
+@builder
+def marked(i: int, value, part=HOLE):
     """True depth with this number where there is none."""
-
-    def values(i: int):
-        plane = true_depth(i)
-        plane[part] = value
-        return plane
-
-    return values
+    plane = true_depth(i)
+    plane[part] = value
+    return plane
 
 
 def hole_is_empty(folder: Path) -> bool:
@@ -106,17 +102,14 @@ def coloured(i: int):
     return np.stack([near, 255 - near, near // 2], axis=2)
 
 
-def renamed(listed_in: str, old: str, name, frames: int, inside: str = ""):
+@builder
+def renamed(folder: Path, listed_in: str, old: str, name, frames: int, inside: str = "") -> None:
     """The pictures of a folder, and the file that lists them `inside` it, with other names by their number."""
-
-    def change(folder: Path) -> None:
-        listed = (folder / listed_in).read_text()
-        for k in reversed(range(frames)):  # no name is written twice
-            (folder / "images" / old.format(k)).rename(folder / "images" / name(k))
-            listed = listed.replace(inside + old.format(k), inside + name(k))
-        (folder / listed_in).write_text(listed)
-
-    return change
+    listed = (folder / listed_in).read_text()
+    for k in reversed(range(frames)):  # no name is written twice
+        (folder / "images" / old.format(k)).rename(folder / "images" / name(k))
+        listed = listed.replace(inside + old.format(k), inside + name(k))
+    (folder / listed_in).write_text(listed)
 
 
 def colmap_named(name):

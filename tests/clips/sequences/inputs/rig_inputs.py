@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+from builders import builder
 from input_kinds import Row, first_to_last, prepare, reworded
 from left_inputs import matrices, squared, true_poses
 from scipy.spatial.transform import Rotation
@@ -68,21 +69,18 @@ def write_truth(folder: Path, cameras: np.ndarray, ticks: int = 4) -> None:
     (folder / "state_groundtruth_estimate0/sensor.yaml").write_text(sensor.format(np.eye(4).ravel().tolist()))
 
 
-def rig(*words: str, second: bool = False, depth: bool = True, change=lambda raw: None):
+@builder
+def rig(folder: Path, *words: str, second: bool = False, depth: bool = True, change=lambda raw: None) -> list[str]:
     """A moving scope as the folder mav0/ of EuRoC, with depth of another program beside it."""
-
-    def make(folder: Path) -> list[str]:
-        cameras = squared(matrices(folder))
-        raw = folder / "raw/mav0"
-        write_camera(raw, "cam0", folder / "clip/images", 0.0)
-        if second:
-            write_camera(raw, "cam1", folder / "clip/images_right", 0.004)
-        write_truth(raw, cameras)
-        change(raw)
-        given = ["--depth", str(folder / "clip/depth"), "--pairing", "order"] if depth and not second else []
-        return prepare("raw", *given, *words, camera=())(folder)
-
-    return make
+    cameras = squared(matrices(folder))
+    raw = folder / "raw/mav0"
+    write_camera(raw, "cam0", folder / "clip/images", 0.0)
+    if second:
+        write_camera(raw, "cam1", folder / "clip/images_right", 0.004)
+    write_truth(raw, cameras)
+    change(raw)
+    given = ["--depth", str(folder / "clip/depth"), "--pairing", "order"] if depth and not second else []
+    return prepare("raw", *given, *words, camera=())(folder)
 
 
 def true_rig(folder: Path, kept: slice = slice(None), baseline: float = 0.0) -> bool:
@@ -98,12 +96,10 @@ def true_rig(folder: Path, kept: slice = slice(None), baseline: float = 0.0) -> 
     )
 
 
-def without(name: str):
-    def change(raw: Path) -> None:
-        found = raw / name
-        shutil.rmtree(found) if found.is_dir() else found.unlink()
-
-    return change
+@builder
+def without(raw: Path, name: str) -> None:
+    found = raw / name
+    shutil.rmtree(found) if found.is_dir() else found.unlink()
 
 
 def last_picture(camera: str):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import one_view
 import raw_sources
+from builders import builder
 from depth_folders import recording as with_depth
 from depth_folders import true_depth
 from input_kinds import (
@@ -122,14 +123,11 @@ def backwards(make):
     return lambda folder: [*make(folder), "--trajectory-direction", "world_to_camera"]
 
 
-def longer(name: str):
+@builder
+def longer(raw: Path, name: str) -> None:
     """A binary file with bytes behind its last entry, as another version of its format has."""
-
-    def change(raw: Path) -> None:
-        file = raw / f"sparse/0/{name}.bin"
-        file.write_bytes(file.read_bytes() + bytes(16))
-
-    return change
+    file = raw / f"sparse/0/{name}.bin"
+    file.write_bytes(file.read_bytes() + bytes(16))
 
 
 def both_forms(raw: Path) -> None:
@@ -252,22 +250,19 @@ def chunk(kind: bytes, content: bytes):
     return folder_of(pictures(4), change=change)
 
 
-def public_endonerf(*names: str):
+@builder
+def public_endonerf(folder: Path, *names: str) -> list[str]:
     """A simulated EndoNeRF folder without masks, with further files."""
-
-    def make(folder: Path) -> list[str]:
-        moving(folder)
-        raw = folder / "clip"
-        for name in ("masks", "gt_masks"):
-            shutil.rmtree(raw / name, ignore_errors=True)
-        for name in names:
-            if name.endswith(".npy"):
-                shutil.copy(raw / "poses_bounds.npy", raw / name)
-            else:
-                with_files(name)(raw)
-        return prepare("clip", camera=())(folder)
-
-    return make
+    moving(folder)
+    raw = folder / "clip"
+    for name in ("masks", "gt_masks"):
+        shutil.rmtree(raw / name, ignore_errors=True)
+    for name in names:
+        if name.endswith(".npy"):
+            shutil.copy(raw / "poses_bounds.npy", raw / name)
+        else:
+            with_files(name)(raw)
+    return prepare("clip", camera=())(folder)
 
 
 def one_more_picture(raw: Path) -> None:
@@ -286,17 +281,14 @@ def of_another_kind(folder: Path) -> None:
         (folder / f"clip/{12 + k:04d}.jp2").write_bytes(b"jp2")
 
 
-def in_one_file(ending: str):
+@builder
+def in_one_file(folder: Path, ending: str) -> list[str]:
     """Depth of a whole clip as one array."""
-
-    def make(folder: Path) -> list[str]:
-        words = with_depth(folder, true_depth, "d", "npy")
-        stack = np.stack([np.load(file) for file in sorted((folder / "d").iterdir())])
-        file = folder / f"clip{ending}"
-        np.savez(file, depths=stack) if ending == ".npz" else np.save(file, stack)
-        return [str(file) if word == str(folder / "d") else word for word in words]
-
-    return make
+    words = with_depth(folder, true_depth, "d", "npy")
+    stack = np.stack([np.load(file) for file in sorted((folder / "d").iterdir())])
+    file = folder / f"clip{ending}"
+    np.savez(file, depths=stack) if ending == ".npz" else np.save(file, stack)
+    return [str(file) if word == str(folder / "d") else word for word in words]
 
 
 def with_no_data(path: Path, plane: np.ndarray) -> None:
@@ -313,25 +305,22 @@ def corner_is_empty(folder: Path) -> bool:
     return bool((seen[:19, :29] == 0).all() and (seen > 0).mean() > 0.9)
 
 
-def disparity(times: float, *words: str, marked: bool = False):
+@builder
+def disparity(folder: Path, times: float, *words: str, marked: bool = False) -> list[str]:
     """Disparities of a clip as 16-bit PNG, or with a sign and -16 at pixels without a match, as OpenCV has them."""
-
-    def make(folder: Path) -> list[str]:
-        where, given = one_view.clip(folder, lambda i: 1800 / true_depth(i))
-        text, file = where / "sequence.toml", read_sequence_file(where)
-        text.write_text(text.read_text().replace("baseline = 0.0", "baseline = 4.0"))
-        for k, one_file in enumerate(sorted(given.iterdir())):
-            pixels = file.camera.fx * 4.0 / true_depth(k)
-            stored = np.rint(pixels * times).astype(np.uint16)
-            one_file.unlink()
-            if marked:
-                stored[:2] = -16 & 0xFFFF
-                np.save(one_file, stored.astype(np.int16))
-            else:
-                write_png(one_file.with_suffix(".png"), stored)
-        return ["depth", str(where), "--given", str(given), "--kind", "disparity", *words]
-
-    return make
+    where, given = one_view.clip(folder, lambda i: 1800 / true_depth(i))
+    text, file = where / "sequence.toml", read_sequence_file(where)
+    text.write_text(text.read_text().replace("baseline = 0.0", "baseline = 4.0"))
+    for k, one_file in enumerate(sorted(given.iterdir())):
+        pixels = file.camera.fx * 4.0 / true_depth(k)
+        stored = np.rint(pixels * times).astype(np.uint16)
+        one_file.unlink()
+        if marked:
+            stored[:2] = -16 & 0xFFFF
+            np.save(one_file, stored.astype(np.int16))
+        else:
+            write_png(one_file.with_suffix(".png"), stored)
+    return ["depth", str(where), "--given", str(given), "--kind", "disparity", *words]
 
 
 def depth_of_disparity(folder: Path) -> bool:

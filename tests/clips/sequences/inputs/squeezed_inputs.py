@@ -4,6 +4,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+from builders import builder
 from input_kinds import MATRIX, Row, centred, folder_of, prepare, sides, size
 from left_inputs import MOVED
 from made_videos import HEIGHT, WIDTH, pictures
@@ -18,42 +19,36 @@ def squeezed(stacked: bool = False) -> list[np.ndarray]:
     return [join([area_resize(view, width, height) for view in pair]) for pair in zip(pictures(), MOVED)]
 
 
-def video(*words: str, stacked: bool = False, mark: str = ""):
+@builder
+def video(folder: Path, *words: str, stacked: bool = False, mark: str = "") -> list[str]:
     """A video of squeezed pairs without loss, as Matroska.
 
     mark   of the pair; the size of the display is then that of one whole view, as the format states it
     """
-
-    def make(folder: Path) -> list[str]:
-        frames = squeezed(stacked)
-        with av.open(str(folder / "a.mkv"), "w") as container:
-            stream = container.add_stream("ffv1", rate=25)
-            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "bgr0"
-            if mark:
-                stream.metadata["stereo_mode"] = mark
-            for pixels in frames:
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
-            container.mux(stream.encode())
-        data = (folder / "a.mkv").read_bytes()
-        for old, new in ((b"\x54\xb0\x81\x40", b"\x54\xb0\x81\x80"), (b"\x54\xba\x81\x30", b"\x54\xba\x81\x60")):
-            data = data.replace(old, new, 1)  # width 64 to 128, height 48 to 96
-        (folder / "a.mkv").write_bytes(data)
-        return prepare("a.mkv", "--baseline", "4", *words)(folder)
-
-    return make
+    frames = squeezed(stacked)
+    with av.open(str(folder / "a.mkv"), "w") as container:
+        stream = container.add_stream("ffv1", rate=25)
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "bgr0"
+        if mark:
+            stream.metadata["stereo_mode"] = mark
+        for pixels in frames:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
+        container.mux(stream.encode())
+    data = (folder / "a.mkv").read_bytes()
+    for old, new in ((b"\x54\xb0\x81\x40", b"\x54\xb0\x81\x80"), (b"\x54\xba\x81\x30", b"\x54\xba\x81\x60")):
+        data = data.replace(old, new, 1)  # width 64 to 128, height 48 to 96
+    (folder / "a.mkv").write_bytes(data)
+    return prepare("a.mkv", "--baseline", "4", *words)(folder)
 
 
-def of_whole_views(*words: str):
+@builder
+def of_whole_views(folder: Path, *words: str) -> list[str]:
     """Squeezed pairs with the calibration of a whole view, which states its size."""
-
-    def make(folder: Path) -> list[str]:
-        text = f"image_width: {WIDTH}\nimage_height: {HEIGHT}\ncamera_matrix: {{data: [{', '.join(MATRIX.split())}]}}\n"
-        (folder / "a.yaml").write_text(text)
-        folder_of(squeezed())(folder)
-        calibration = ("--calibration", str(folder / "a.yaml"), "--baseline", "4")
-        return prepare("clip", *calibration, *words, camera=())(folder)
-
-    return make
+    text = f"image_width: {WIDTH}\nimage_height: {HEIGHT}\ncamera_matrix: {{data: [{', '.join(MATRIX.split())}]}}\n"
+    (folder / "a.yaml").write_text(text)
+    folder_of(squeezed())(folder)
+    calibration = ("--calibration", str(folder / "a.yaml"), "--baseline", "4")
+    return prepare("clip", *calibration, *words, camera=())(folder)
 
 
 def whole(folder: Path) -> bool:

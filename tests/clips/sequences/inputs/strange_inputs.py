@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from builders import builder
 from depth_folders import true_depth
 from input_kinds import CAMERA, Row, common, depth_files, folder_of, named, pair, prepare
 from made_videos import HEIGHT, WIDTH, files, picture, pictures, write
@@ -17,14 +18,11 @@ def exchanged_bytes(path: Path, plane: np.ndarray) -> None:
     write_png(path, np.round(plane * 100).astype(np.uint16).byteswap())
 
 
-def lens(*words: str, size=(WIDTH, HEIGHT), camera=CAMERA):
+@builder
+def lens(folder: Path, *words: str, size=(WIDTH, HEIGHT), camera=CAMERA) -> list[str]:
     """Pictures of this size with a camera, and further words."""
-
-    def make(folder: Path) -> list[str]:
-        files(folder, "clip", [picture(i, *size) for i in range(12)])
-        return prepare("clip", *words, camera=camera)(folder)
-
-    return make
+    files(folder, "clip", [picture(i, *size) for i in range(12)])
+    return prepare("clip", *words, camera=camera)(folder)
 
 
 def prepared(folder: Path, *words: str) -> Path:
@@ -41,32 +39,26 @@ def red_and_grey() -> list[np.ndarray]:
     return found
 
 
-def keys(value_inside: int, value_outside: int, *words: str):
+@builder
+def keys(folder: Path, value_inside: int, value_outside: int, *words: str) -> list[str]:
     """Masks of two key frames with these numbers on the instrument and beside it."""
-
-    def make(folder: Path) -> list[str]:
-        clip = prepared(folder)
-        plane = np.full((HEIGHT, WIDTH), value_outside, np.uint8)
-        plane[20:60, 40:80] = value_inside
-        (folder / "k").mkdir()
-        for i in (0, 6):
-            write_png(folder / "k" / f"{i:06d}.png", plane)
-        return ["masks", str(clip), "--keys", str(folder / "k"), *words]
-
-    return make
+    clip = prepared(folder)
+    plane = np.full((HEIGHT, WIDTH), value_outside, np.uint8)
+    plane[20:60, 40:80] = value_inside
+    (folder / "k").mkdir()
+    for i in (0, 6):
+        write_png(folder / "k" / f"{i:06d}.png", plane)
+    return ["masks", str(clip), "--keys", str(folder / "k"), *words]
 
 
-def given(factor: float):
+@builder
+def given(folder: Path, factor: float) -> list[str]:
     """True depth times a factor, as files for `endotsr depth`."""
-
-    def make(folder: Path) -> list[str]:
-        clip = prepared(folder)
-        (folder / "d").mkdir()
-        for i in range(12):
-            np.save(folder / "d" / f"{i:04d}.npy", (factor * true_depth(i)).astype(np.float32))
-        return ["depth", str(clip), "--given", str(folder / "d"), "--kind", "depth"]
-
-    return make
+    clip = prepared(folder)
+    (folder / "d").mkdir()
+    for i in range(12):
+        np.save(folder / "d" / f"{i:04d}.npy", (factor * true_depth(i)).astype(np.float32))
+    return ["depth", str(clip), "--given", str(folder / "d"), "--kind", "depth"]
 
 
 def textured(i: int, shift: int = 0, down: int = 0) -> np.ndarray:
@@ -76,15 +68,12 @@ def textured(i: int, shift: int = 0, down: int = 0) -> np.ndarray:
     return np.stack([whole, whole / 2, whole / 2], axis=2).astype(np.uint8)
 
 
-def matched(right):
+@builder
+def matched(folder: Path, right) -> list[str]:
     """`endotsr depth` on a pair of cameras whose right view is made by a function of the number of the frame."""
-
-    def make(folder: Path) -> list[str]:
-        shown = [textured(i) for i in range(4)], [right(i) for i in range(4)]
-        main(pair(frames=shown)(folder))
-        return ["depth", str(folder / "o")]
-
-    return make
+    shown = [textured(i) for i in range(4)], [right(i) for i in range(4)]
+    main(pair(frames=shown)(folder))
+    return ["depth", str(folder / "o")]
 
 
 def videos_in_a_folder(folder: Path) -> list[str]:

@@ -4,6 +4,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+from builders import builder
 from depth_folders import true_depth
 from input_kinds import (
     MATRIX,
@@ -127,16 +128,13 @@ def letterbox(count=12):
     return found
 
 
-def edited(name: str, change):
+@builder
+def edited(folder: Path, name: str, change) -> list[str]:
     """A text file of the common format with other bytes."""
-
-    def make(folder: Path) -> list[str]:
-        words = common()(folder)
-        file = folder / "clip" / name
-        file.write_bytes(change(file.read_bytes()))
-        return words
-
-    return make
+    words = common()(folder)
+    file = folder / "clip" / name
+    file.write_bytes(change(file.read_bytes()))
+    return words
 
 
 def opencv_matrix(name: str, numbers, cols: int) -> str:

@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+from builders import builder
 from input_kinds import Row, centred, close, converted, folder_of, prepare, public, with_files
 from made_videos import pictures
 from public_layouts import K
@@ -41,14 +42,11 @@ def as_downloaded(raw: Path) -> None:
     (raw / "endoscope_calibration.yaml").rename(raw / "camera_calibration.yaml")
 
 
-def true_at(*frames: int):
+@builder
+def true_at(folder: Path, *frames: int) -> bool:
     """The poses of these frames are the true ones."""
-
-    def check(folder: Path) -> bool:
-        found = np.array(read_sequence_file(folder / "o").poses.matrices).reshape(-1, 3, 4)
-        return all(np.allclose(found[k], true_poses()[k][:3], atol=1e-4) for k in frames)
-
-    return check
+    found = np.array(read_sequence_file(folder / "o").poses.matrices).reshape(-1, 3, 4)
+    return all(np.allclose(found[k], true_poses()[k][:3], atol=1e-4) for k in frames)
 
 
 def other_cameras(raw: Path) -> None:
@@ -62,13 +60,11 @@ def two_left(raw: Path) -> None:
     shutil.copytree(raw / "image01", raw / "color")
 
 
-def stream(write, name: str, **keys):
-    def make(folder: Path) -> list[str]:
-        (folder / "v").mkdir()
-        write(folder / "v", keys)
-        return prepare(f"v/{name}")(folder)
-
-    return make
+@builder
+def stream(folder: Path, write, name: str, **keys) -> list[str]:
+    (folder / "v").mkdir()
+    write(folder / "v", keys)
+    return prepare(f"v/{name}")(folder)
 
 
 def oblong(folder: Path) -> None:

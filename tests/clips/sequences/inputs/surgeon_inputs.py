@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from builders import builder
 from depth_folders import true_depth
 from input_kinds import OPENCV, Row, calibrated, folder_of, prepare, video
 from made_videos import HEIGHT, WIDTH, files, picture, pictures
@@ -16,14 +17,11 @@ WIDE = ("--camera", "250", "250", "128", "96")
 OTHER_ORDER = "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [-0.1, 0.01, {}]\n"
 
 
-def of_tissue(change, *words: str):
+@builder
+def of_tissue(folder: Path, change, *words: str) -> list[str]:
     """Pictures of moving tissue, changed."""
-
-    def make(folder: Path) -> list[str]:
-        files(folder, "clip", [change(tissue(i), i) for i in range(FRAMES)])
-        return prepare("clip", *words, camera=WIDE)(folder)
-
-    return make
+    files(folder, "clip", [change(tissue(i), i) for i in range(FRAMES)])
+    return prepare("clip", *words, camera=WIDE)(folder)
 
 
 def exchanged(frames: list) -> list:
@@ -35,20 +33,17 @@ def slow(count: int = 16) -> list[np.ndarray]:
     return [picture(0.5 * i) for i in range(count)]
 
 
-def mirrored_masks(flip) -> list[str]:
+@builder
+def mirrored_masks(folder: Path, flip) -> list[str]:
     """A grey instrument at the left, and masks of it."""
-
-    def make(folder: Path) -> list[str]:
-        shown, masks = pictures(), []
-        for frame in shown:
-            frame[20:80, :40] = 110
-            mask = np.zeros((HEIGHT, WIDTH), np.uint8)
-            mask[20:80, :40] = 255
-            masks.append(flip(mask))
-        files(folder, "m", masks)
-        return [*folder_of(shown)(folder), "--masks", str(folder / "m")]
-
-    return make
+    shown, masks = pictures(), []
+    for frame in shown:
+        frame[20:80, :40] = 110
+        mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+        mask[20:80, :40] = 255
+        masks.append(flip(mask))
+    files(folder, "m", masks)
+    return [*folder_of(shown)(folder), "--masks", str(folder / "m")]
 
 
 def soft_depth(folder: Path) -> list[str]:
@@ -62,17 +57,14 @@ def soft_depth(folder: Path) -> list[str]:
     return [*prepare("clip")(folder), "--depth", str(folder / "d")]
 
 
-def simulated(change, *words: str):
+@builder
+def simulated(folder: Path, change, *words: str) -> list[str]:
     """A simulated clip with its right view, whose depth is changed."""
-
-    def make(folder: Path) -> list[str]:
-        size = ["--width", "192", "--height", "160", "--frames", "3"]
-        main(["simulate", "still", "--out", str(folder / "raw"), *size])
-        for file in (folder / "raw/depth").iterdir():
-            write_png(file, change(read_png(file).astype(np.uint16)).astype(np.uint16))
-        return prepare("raw", "--baseline", "4", *words, camera=())(folder)
-
-    return make
+    size = ["--width", "192", "--height", "160", "--frames", "3"]
+    main(["simulate", "still", "--out", str(folder / "raw"), *size])
+    for file in (folder / "raw/depth").iterdir():
+        write_png(file, change(read_png(file).astype(np.uint16)).astype(np.uint16))
+    return prepare("raw", "--baseline", "4", *words, camera=())(folder)
 
 
 def bars(shown: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import raw_sources
+from builders import builder
 from input_kinds import Row, common, folder_of, pair, prepare, raw, timed, with_files
 from left_inputs import lens_of, matrices
 from made_videos import pictures
@@ -53,23 +54,20 @@ def later_path(folder: Path, begin: int) -> np.ndarray:
     return np.column_stack([EPOCH + STEP / 1e9 * ticks, np.repeat(rows, 4, axis=0)])
 
 
-def on_one_clock(by_names: bool):
+@builder
+def on_one_clock(folder: Path, by_names: bool) -> list[str]:
     """Pictures with their times, in a list or as their names, and a trajectory that begins with the fourth."""
-
-    def make(folder: Path) -> list[str]:
-        np.savetxt(folder / "path.txt", later_path(folder, 3), fmt="%.9f")
-        images = sorted((folder / "clip/images").iterdir())
-        times = [f"{EPOCH + STEP / 1e9 * k:.6f}" for k in range(len(images))]
-        if by_names:
-            for file, time in zip(images, times):
-                file.rename(file.with_name(f"{time}.png"))
-        else:
-            (folder / "clip/images/timestamps.txt").write_text("\n".join(times) + "\n")
-        lens = ("--camera", *map(str, lens_of(folder / "clip")))
-        words = ("--trajectory", str(folder / "path.txt"), "--gaps", "drop")
-        return prepare("clip/images", *words, camera=lens)(folder)
-
-    return make
+    np.savetxt(folder / "path.txt", later_path(folder, 3), fmt="%.9f")
+    images = sorted((folder / "clip/images").iterdir())
+    times = [f"{EPOCH + STEP / 1e9 * k:.6f}" for k in range(len(images))]
+    if by_names:
+        for file, time in zip(images, times):
+            file.rename(file.with_name(f"{time}.png"))
+    else:
+        (folder / "clip/images/timestamps.txt").write_text("\n".join(times) + "\n")
+    lens = ("--camera", *map(str, lens_of(folder / "clip")))
+    words = ("--trajectory", str(folder / "path.txt"), "--gaps", "drop")
+    return prepare("clip/images", *words, camera=lens)(folder)
 
 
 def tum(change):

@@ -6,6 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from builders import builder
 
 from data_folder import data_folder, recorded_masks
 from endonerf_writer import write_endonerf
@@ -182,38 +183,30 @@ def test_hard_E2_soft_masks_are_thresholded_and_noted_or_refused(tmp_path):
         read_sequence(tmp_path, SequenceConfig())
 
 
-def _rewrite_rows(change):
-    def damage(folder):
-        rows = np.load(folder / "poses_bounds.npy")
-        rows = change(rows)
-        np.save(folder / "poses_bounds.npy", rows, allow_pickle=True)
-
-    return damage
+@builder
+def _rewrite_rows(folder, change):
+    rows = np.load(folder / "poses_bounds.npy")
+    rows = change(rows)
+    np.save(folder / "poses_bounds.npy", rows, allow_pickle=True)
 
 
-def _set(row, column, value):
-    def change(rows):
-        rows[row, column] = value
-        return rows
-
-    return change
+@builder
+def _set(rows, row, column, value):
+    rows[row, column] = value
+    return rows
 
 
-def _cut(name, keep):
-    def damage(folder):
-        data = (folder / name).read_bytes()
-        (folder / name).write_bytes(data[: int(keep * len(data))])
-
-    return damage
+@builder
+def _cut(folder, name, keep):
+    data = (folder / name).read_bytes()
+    (folder / name).write_bytes(data[: int(keep * len(data))])
 
 
-def _flip_byte(name):
-    def damage(folder):
-        data = bytearray((folder / name).read_bytes())
-        data[len(data) // 2] ^= 0xFF
-        (folder / name).write_bytes(data)
-
-    return damage
+@builder
+def _flip_byte(folder, name):
+    data = bytearray((folder / name).read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    (folder / name).write_bytes(data)
 
 
 def _picture(name, pixels):
@@ -225,12 +218,10 @@ def _no_depth(folder):
         cv2.imwrite(str(file), np.zeros((24, 32), np.uint8))
 
 
-def _empty(name):
-    def damage(folder):
-        for file in (folder / name).iterdir():
-            file.unlink()
-
-    return damage
+@builder
+def _empty(folder, name):
+    for file in (folder / name).iterdir():
+        file.unlink()
 
 
 def _rename(old, new):
