@@ -45,31 +45,20 @@ def tiff_seeds() -> list[bytes]:
     return [cv2.imencode(".tiff", plane)[1].tobytes() for plane in planes]
 
 
-@cache
-def bmp_seeds() -> list[bytes]:
-    """Colour, grey and palette."""
-    return _by_pillow("bmp")
+WAYS = {  # to store a picture: without and with loss, packed, with a header of the extended form
+    "bmp": [{}], "webp": [{}, {"lossless": True}, {"icc_profile": b"x" * 40}],
+    "tiff": [{"compression": way} for way in (None, "tiff_lzw", "tiff_adobe_deflate", "packbits")],
+}  # fmt: skip
 
 
-@cache
-def webp_seeds() -> list[bytes]:
-    """With and without loss, and with a header of the extended form."""
-    return _by_pillow("webp") + _by_pillow("webp", lossless=True) + _by_pillow("webp", icc_profile=b"x" * 40)
-
-
-@cache
-def colour_tiff_seeds() -> list[bytes]:
-    """Uncompressed and compressed in three ways."""
-    return [data for way in (None, "tiff_lzw", "tiff_adobe_deflate", "packbits") for data in
-            _by_pillow("tiff", compression=way)]  # fmt: skip
-
-
-def _by_pillow(kind: str, **how: object) -> list[bytes]:
+def pillow_seeds(kind: str) -> list[bytes]:
+    """A picture in colour, in grey and with a palette, each stored in every way."""
     picture, found = Image.fromarray(np.random.default_rng(0).integers(0, 255, (9, 13, 3), np.uint8)), []
-    for mode in ("RGB", "L", "P"):
-        out = io.BytesIO()
-        picture.convert(mode).save(out, kind, **how)
-        found.append(out.getvalue())
+    for way in WAYS[kind]:
+        for mode in ("RGB", "L", "P"):
+            out = io.BytesIO()
+            picture.convert(mode).save(out, kind, **way)
+            found.append(out.getvalue())
     return found
 
 
@@ -173,28 +162,24 @@ def read_trajectory(path: Path) -> object:
     return filled(poses) if any(pose is not None for pose in poses) else poses
 
 
+def _mat(variables: dict, packed: bool) -> bytes:
+    out = io.BytesIO()
+    savemat(out, variables, do_compression=packed)
+    return out.getvalue()
+
+
 @cache
 def matlab_seeds() -> list[bytes]:
     """One camera and two of MATLAB, and the variables of Bouguet's toolbox; packed and not."""
     camera, pair = {"cameraParams": field_inputs.MAT_CAMERA}, {"stereoParams": field_inputs.MAT_PAIR}
-    found = []
-    for variables in (camera, pair, field_inputs.TOOLBOX):
-        for packed in (False, True):
-            out = io.BytesIO()
-            savemat(out, variables, do_compression=packed)
-            found.append(out.getvalue())
-    return found
+    return [_mat(variables, packed) for variables in (camera, pair, field_inputs.TOOLBOX) for packed in (False, True)]
 
 
 @cache
 def matlab_depth_seeds() -> list[bytes]:
     """A frame in real and in whole numbers."""
-    found = []
-    for kind in (np.float32, np.uint16):
-        out = io.BytesIO()
-        savemat(out, {"depth": np.arange(1, 64, dtype=kind).reshape(7, 9)}, do_compression=kind is np.uint16)
-        found.append(out.getvalue())
-    return found
+    plane = np.arange(1, 64).reshape(7, 9)
+    return [_mat({"depth": plane.astype(kind)}, kind is np.uint16) for kind in (np.float32, np.uint16)]
 
 
 def times_seeds() -> list[bytes]:
