@@ -42,11 +42,11 @@ def woven(count: int = 12) -> list[Picture]:
 
 
 def files(folder: Path, name: str, frames, ending: str = "png") -> None:
-    """Pictures, masks or depth in a folder: 0000.png, 0001.png, ..."""
+    """Pictures, masks or depth in a folder: 0000.png, 0001.png, ...; ending: png, jpg or npy."""
+    writers = {"png": write_png, "jpg": write_jpeg, "npy": np.save}
     (folder / name).mkdir(parents=True)
     for i, frame in enumerate(frames):
-        path = folder / name / f"{i:04d}.{ending}"
-        write_png(path, frame) if ending == "png" else write_jpeg(path, frame)
+        writers[ending](folder / name / f"{i:04d}.{ending}", frame)
 
 
 @contextmanager

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from made_videos import files
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv.png import read_png, write_png
+from endotsr.clips.opencv.png import read_png
 
 FRAMES, HEIGHT, WIDTH = 5, 24, 32
 TOOL = np.zeros((FRAMES, HEIGHT, WIDTH), bool)
@@ -19,10 +20,7 @@ KINDS = {
 
 def prepared(folder, *words):
     """The exit status of `prepare`, and the masks that it writes, True = excluded."""
-    (folder / "source").mkdir()
-    pictures = np.random.default_rng(0).integers(90, 200, (FRAMES, HEIGHT, WIDTH, 3), np.uint8)
-    for i in range(FRAMES):
-        write_png(folder / "source" / f"{i}.png", pictures[i])
+    files(folder, "source", np.random.default_rng(0).integers(90, 200, (FRAMES, HEIGHT, WIDTH, 3), np.uint8))
     camera = ["--camera", "30", "30", "16", "12"]
     status = main(["prepare", str(folder / "source"), "--out", str(folder / "clip"), *camera, *words])
     return status, [read_png(file) > 0 for file in sorted((folder / "clip").glob("masks/*"))]
@@ -49,9 +47,7 @@ def test_a_compressed_archive_an_inverted_one_and_numbers_of_objects(tmp_path):
 
 
 def test_one_file_a_frame_and_one_for_all(tmp_path, capsys):
-    (tmp_path / "masks").mkdir()
-    for i in range(FRAMES):
-        np.save(tmp_path / "masks" / f"{i}.npy", TOOL[i])
+    files(tmp_path, "masks", TOOL, "npy")
     np.save(tmp_path / "scope.npy", ~TOOL.any(axis=0))
     words = ["--masks", str(tmp_path / "masks"), "--unite-masks", str(tmp_path / "scope.npy")]
     status, masks = prepared(tmp_path, *words)

@@ -159,15 +159,10 @@ def test_masks_of_any_source_keep_their_mark(tmp_path):
 
 def test_masks_take_the_place_of_those_of_a_prepared_sequence(tmp_path):
     written(tmp_path / "clip")
-    (tmp_path / "m" / "masks").mkdir(parents=True)
-    for i in range(FRAMES):
-        write_png(
-            tmp_path / f"m/masks/{i:06d}.png", np.where(np.arange(32) < 5 + i, 255, 0)[None].repeat(24, 0).astype("u1")
-        )
-    assert (
-        main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "b"), "--masks", str(tmp_path / "m/masks")])
-        == 0
+    files(
+        tmp_path, "m", [np.where(np.arange(32) < 5 + i, 255, 0)[None].repeat(24, 0).astype("u1") for i in range(FRAMES)]
     )
+    assert main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "b"), "--masks", str(tmp_path / "m")]) == 0
     for i in range(FRAMES):
         assert (read_png(tmp_path / f"b/masks/{i:06d}.png") > 0).sum() == 24 * (5 + i)
 

@@ -25,9 +25,7 @@ def test_the_parallax_of_a_pair_speaks_against_a_disparity(tmp_path, capsys):
     left, right, moved = slanted_pair()[:3]
     for name, picture in (("left", left), ("right", right)):
         files(tmp_path / "clip", name, [np.roll(picture, i, 0) for i in range(3)])
-    (tmp_path / "depth").mkdir()
-    for i in range(3):
-        np.save(tmp_path / "depth" / f"{i:04d}.npy", np.roll(moved, i, 0).astype(np.float32))
+    files(tmp_path, "depth", [np.roll(moved, i, 0).astype(np.float32) for i in range(3)], "npy")
     height, width = left.shape[:2]
     words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--baseline", "4"]
     words += ["--camera", "200", "200", str(width / 2), str(height / 2), "--depth", str(tmp_path / "depth")]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from common_folder import FRAMES, HEIGHT, WIDTH, write_plane, written
+from made_videos import files
 from stereo_pairs import BASELINE, LENS, slanted_pair, stereo_folder, texture
 
 from data_folder import data_folder
@@ -173,9 +174,8 @@ def test_a_real_pair_agrees_with_the_given_depth():
 
 def test_depth_beyond_the_steps_of_the_first_frame_is_said(tmp_path):
     written(tmp_path / "clip", depth=False)
-    (tmp_path / "other").mkdir()
-    for i in range(FRAMES):
-        np.save(tmp_path / "other" / f"{i:06d}.npy", np.full((HEIGHT, WIDTH), 500.0 if i == 3 else 10.0 + i))
+    planes = [np.full((HEIGHT, WIDTH), 500.0 if i == 3 else 10.0 + i) for i in range(FRAMES)]
+    files(tmp_path, "other", planes, "npy")
     report = write_depth(tmp_path / "clip", from_files(tmp_path / "clip", tmp_path / "other", "depth", 1.0))
     assert report.note == (
         f"{HEIGHT * WIDTH} pixels are clipped at 131.07, at least eight times the usual largest depth of the first"

@@ -3,12 +3,12 @@
 import cv2
 import numpy as np
 import pytest
+from made_videos import files
 from still_text import FRAMES, tissue
 
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv.pictures import read_picture
-from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.checks.colour_planes import FEWEST, ColourPlanes, displacement
 
 
@@ -72,9 +72,7 @@ def test_an_anaglyph_of_a_recorded_pair_is_named():
 
 
 def test_prepare_and_check_name_it(tmp_path, capsys):
-    (tmp_path / "raw").mkdir()
-    for i in range(FRAMES):
-        write_png(tmp_path / f"raw/{i:03d}.png", shifted(tissue(i), 5))
+    files(tmp_path, "raw", [shifted(tissue(i), 5) for i in range(FRAMES)])
     words = ["--camera", "250", "250", "128", "96"]
     assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip"), *words]) == 0
     assert "warning: shifted-colours: in 12 of 12 frames" in capsys.readouterr().out

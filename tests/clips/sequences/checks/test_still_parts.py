@@ -4,12 +4,12 @@ import cv2
 import msgspec
 import numpy as np
 import pytest
+from made_videos import files
 from still_text import FRAMES, HEIGHT, WIDTH, tissue, with_text
 
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv.pictures import read_picture
-from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.checks.still_parts import Edges, StillParts, plain_findings
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.simulate import simulate
@@ -122,9 +122,7 @@ def test_a_still_scene_under_amplified_noise_says_nothing():
 
 
 def test_prepare_and_check_name_it(tmp_path, capsys):
-    (tmp_path / "raw").mkdir()
-    for i in range(FRAMES):
-        write_png(tmp_path / f"raw/{i:03d}.png", with_text(tissue(i)))
+    files(tmp_path, "raw", [with_text(tissue(i)) for i in range(FRAMES)])
     words = ["--camera", "250", "250", "128", "96"]
     assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip"), *words]) == 0
     assert "warning: burnt-in: sharp edges stand still" in capsys.readouterr().out

@@ -55,9 +55,7 @@ def keys(folder: Path, value_inside: int, value_outside: int, *words: str) -> li
 def given(folder: Path, factor: float) -> list[str]:
     """True depth times a factor, as files for `endotsr depth`."""
     clip = prepared(folder)
-    (folder / "d").mkdir()
-    for i in range(12):
-        np.save(folder / "d" / f"{i:04d}.npy", (factor * true_depth(i)).astype(np.float32))
+    files(folder, "d", [(factor * true_depth(i)).astype(np.float32) for i in range(12)], "npy")
     return ["depth", str(clip), "--given", str(folder / "d"), "--kind", "depth"]
 
 

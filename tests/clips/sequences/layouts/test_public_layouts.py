@@ -8,6 +8,7 @@ import tracemalloc
 import numpy as np
 import public_layouts as made
 import pytest
+from made_videos import files
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv.png import read_png, write_png
@@ -103,9 +104,7 @@ def test_files_that_macos_writes_beside_others_are_passed_over(tmp_path):
     made.c3vd(tmp_path / "c3vd")
     (tmp_path / "c3vd/._0_color.png").write_bytes(b"\0\5\x16\7\xff")
     assert describe(tmp_path / "scared").count == made.FRAMES and describe(tmp_path / "c3vd").count == 2
-    (tmp_path / "pictures").mkdir()
-    for i in range(3):
-        write_png(tmp_path / "pictures" / f"{i}.png", made.picture(i))
+    files(tmp_path, "pictures", map(made.picture, range(3)))
     (tmp_path / "pictures/times.txt").write_text("0.0\n0.1\n0.3\n")
     (tmp_path / "pictures/._times.txt").write_bytes(b"\0\5\x16\7\xff")
     np.testing.assert_allclose(describe(tmp_path / "pictures").times, [0.0, 0.1, 0.3])
@@ -264,9 +263,7 @@ def test_points_of_nerfstudio_follow_applied_scale(tmp_path):
 @pytest.mark.parametrize("excluded", ["white", "black"])
 def test_stated_masks_of_points_have_the_stated_polarity(tmp_path, excluded):
     """They were read as `mask.png`, whose white is tissue, and --excluded-value was ignored."""
-    (tmp_path / "raw/images").mkdir(parents=True)
-    for i in range(3):
-        write_png(tmp_path / f"raw/images/{i:06d}.png", np.full((48, 64, 3), (150, 60, 60), np.uint8))
+    files(tmp_path, "raw/images", [np.full((48, 64, 3), (150, 60, 60), np.uint8)] * 3)
     poses, K = np.tile(np.eye(4), (3, 1, 1)), np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]])
     points, visible = np.array([[0.0, 0, 5], [1, 0, 6], [0, 1, 7], [1, 1, 5]]), np.ones((4, 3), bool)
     np.savez(

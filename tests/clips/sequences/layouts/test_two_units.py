@@ -2,10 +2,10 @@
 
 import pytest
 from common_folder import moving, written
+from made_videos import files
 from raw_sources import ini, scene_picture
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 CAMERA = ["--camera", "60", "61", "30", "25"]
@@ -14,10 +14,8 @@ CAMERA = ["--camera", "60", "61", "30", "25"]
 @pytest.fixture
 def pair(tmp_path):
     """Pictures of two views with poses; returns the words of `prepare` but the baseline."""
-    for i in range(3):
-        for side in ("left", "right"):
-            (tmp_path / "raw" / side).mkdir(parents=True, exist_ok=True)
-            write_png(tmp_path / "raw" / side / f"{i:03d}.png", scene_picture(i))
+    for side in ("left", "right"):
+        files(tmp_path / "raw", side, map(scene_picture, range(3)))
     lines = [f"{i} {0.1 * i} 0 0 0 0 0 1" for i in range(3)]
     (tmp_path / "poses.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
     words = ["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "out")]
@@ -37,9 +35,7 @@ def test_an_arbitrary_unit_of_the_positions_beside_a_baseline_is_refused(tmp_pat
 
 
 def test_an_arbitrary_unit_of_the_depth_beside_a_baseline_is_refused(tmp_path, pair, capsys):
-    (tmp_path / "depth").mkdir()
-    for i in range(3):
-        write_png(tmp_path / "depth" / f"{i:03d}.png", scene_picture(i)[:, :, 0])
+    files(tmp_path, "depth", [scene_picture(i)[:, :, 0] for i in range(3)])
     words = [*pair[:4], *CAMERA, "--depth", str(tmp_path / "depth"), "--depth-unit", "arbitrary", "--trust-depth"]
     assert main([*words, "--baseline", "4"]) == 2
     assert "--depth-unit arbitrary" in capsys.readouterr().err
