@@ -195,7 +195,7 @@ def _write_frames(
         elif clip.depth is not None or (clip.points is not None and settings.points != "none"):
             without_depth.append(i)
             _write_no_depth(folder, k, straight.intrinsics)
-        seen.add(new.left, tissue, depth)
+        seen.add(new, tissue, depth)
         on_frame(k + 1, len(chosen))
     assert straight is not None
     notes += notes_of(_findings(clip, straight, facts))

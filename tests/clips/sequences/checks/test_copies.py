@@ -1,14 +1,17 @@
 """Frames that repeat another one: found up to coding noise, told from pauses, and never held out beside a twin."""
 
 import io
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from common_folder import written
+from moving_pictures import recorded, tissue
 
 from data_folder import data_folder
 from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.copies import (
+    blended_finding,
     copied_frames,
     pattern_of,
     picture_numbers,
@@ -48,6 +51,20 @@ def test_a_pattern_of_copies_is_found_with_the_frames_without_them(source, frame
 def _slice(part: str) -> slice:
     first, _, step = part.split(":")
     return slice(int(first or 0), None, int(step))
+
+
+@pytest.mark.parametrize("name", ["", "endonerf_pulling", "endonerf_cutting"])
+def test_every_second_picture_that_is_a_mean_of_its_neighbours_is_named(name):
+    for pictures in recorded(name) if name else [tissue(30)]:
+        readable = np.ones(len(pictures), bool)
+        assert blended_finding(pictures, steps_between(pictures), readable, "clip") == []
+        means = [(a + b) // 2 for a, b in pairwise(pictures)]
+        for first, frames in ((pictures, "::2"), (pictures[1:], "1::2")):
+            order = (first, means) if frames == "::2" else (means, first)
+            mixed = [picture for both in zip(*order) for picture in both]
+            (found,) = blended_finding(mixed, steps_between(mixed), np.ones(len(mixed), bool), "clip")
+            assert found.code == "blended-frames" and found.what.endswith(f"--frames {frames}")
+            assert blended_finding(mixed[:9], steps_between(mixed[:9]), readable[:9], "clip") == []
 
 
 def test_steady_motion_pauses_and_single_copies_are_no_pattern():

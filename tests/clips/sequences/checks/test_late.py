@@ -53,6 +53,16 @@ def test_holes_of_another_frame_are_named(lag, words):
     assert (code, where) == ("late-depth", "depth") and f"be {words}: its holes" in what and "0.0% if" in what
 
 
+def test_masks_and_holes_in_reversed_order_are_named():
+    masks, holes = LateParts(), LateParts()
+    for t in range(FRAMES):
+        masks.add(moment(t)[0], moment(FRAMES - 1 - t)[1], None)
+        holes.add(*moment(t)[:2], moment(FRAMES - 1 - t)[2])
+    for parts, code in ((masks, "late-masks"), (holes, "late-depth")):
+        ((found,),) = [parts.findings("masks", "depth")]
+        assert found.code == code and "reversed order" in found.what
+
+
 def test_a_still_mask_colours_without_difference_and_frames_without_masks_have_none():
     picture, tissue, depth = moment(0)
     still, alike, without = LateParts(), LateParts(), LateParts()

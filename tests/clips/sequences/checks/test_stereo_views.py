@@ -84,6 +84,13 @@ def test_a_right_view_that_is_the_left_one_is_named(equal, words, tmp_path):
     assert code == "same-views" and words in what
 
 
+@pytest.mark.parametrize(("factor", "words"), [(0.5, "0.5"), (0.85, "")])
+def test_a_right_view_that_is_darker_is_named(factor, words, tmp_path):
+    views = [(left, (right * factor).astype(np.uint8)) for left, right in pairs()]
+    found = [what for code, what in said(views, tmp_path) if code == "unequal-views"]
+    assert len(found) == bool(words) and all(f"the right view is {words}" in what for what in found)
+
+
 def test_a_pause_of_both_views_and_a_single_repeat_are_no_frozen_view():
     still, once = MOVING.copy(), MOVING.copy()
     still[3:9], once[5] = 0.0, 0.0

@@ -31,6 +31,19 @@ def test_text_is_named_with_its_place_and_moving_tissue_is_not():
     assert 35 <= left < right <= 220
 
 
+def test_an_inset_in_a_corner_is_named_and_the_blocks_of_jpeg_are_not():
+    for rows, columns, corner in ((np.s_[:64], np.s_[-80:], "upper right"), (np.s_[-64:], np.s_[:80], "lower left")):
+        pictures = [tissue(i) for i in range(FRAMES)]
+        for i, picture in enumerate(pictures):
+            picture[rows, columns] = 255 - cv2.resize(tissue(FRAMES - 1 - i), (80, 64), interpolation=cv2.INTER_AREA)
+        ((code, what),) = said(pictures)
+        width, height = map(int, what.split("about ")[1].split()[0].split("x"))
+        assert code == "straight-border" and f"in the {corner} corner" in what
+        assert abs(width - 80) <= 2 and abs(height - 64) <= 2
+    jpeg = lambda picture: cv2.imdecode(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 15])[1], 1)
+    assert said([jpeg(cv2.GaussianBlur(tissue(i), None, 3)) for i in range(FRAMES)]) == []
+
+
 def test_excluded_text_a_still_scene_and_few_frames_say_nothing():
     pictures = [with_text(tissue(i)) for i in range(FRAMES)]
     outside = np.ones((HEIGHT, WIDTH), bool)

@@ -15,7 +15,7 @@ from endotsr.clips.formats.picture_fields import colours_differ
 from endotsr.clips.sequences.checks.blurred import blurred_findings, sharpness
 from endotsr.clips.sequences.checks.clock_names import clock_findings
 from endotsr.clips.sequences.checks.colours import colour_findings
-from endotsr.clips.sequences.checks.copies import SAME, copy_findings, return_finding, steps_between
+from endotsr.clips.sequences.checks.copies import SAME, blended_finding, copy_findings, return_finding, steps_between
 from endotsr.clips.sequences.checks.exchanged import exchanged_findings
 from endotsr.clips.sequences.checks.frame_order import order_findings
 from endotsr.clips.sequences.checks.halves import halves_finding
@@ -82,6 +82,7 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
     steps = steps_between([fact.small for fact in facts])
     names = [fact.name for fact in facts]
     found += copy_findings(steps, names, readable, where)
+    found += blended_finding([fact.small for fact in facts], steps, readable, where)
     found += return_finding([fact.small for fact in facts], steps, names, readable, where)
     found += exchanged_findings([fact.small for fact in facts], steps, names, readable, where)
     found += order_findings([fact.small for fact in facts], names, readable, where)

@@ -69,6 +69,8 @@ KINDS: dict[str, Kind] = {
     "repeated-frames": Kind("warning", "the motion stops and jumps, and training leaves out every frame that a held-out"
                             " frame repeats",
                             "prepare the clip again with the --frames that are named"),
+    "blended-frames": Kind("warning", "they show two moments at once, as programs make them that double a frame rate",
+                           "prepare the clip again with the --frames that are named"),
     "returning-frames": Kind("warning", "time goes on where the picture goes back, as in a clip that is joined to"
                              " itself or played back and forth; training leaves out every frame that a held-out frame"
                              " repeats",
@@ -121,6 +123,10 @@ KINDS: dict[str, Kind] = {
     "late-right-view": Kind("warning", "depth from such a pair joins two moments, and tissue that moves gets a"
                             " wrong one",
                             "join pairs of one moment: endotsr prepare --right-late N; -N for an early view"),
+    "unequal-views": Kind("warning", "stereo matching compares the brightness of both views, and finds little or wrong"
+                          " depth",
+                          "export both views with one exposure and one range; if a camera is darker, brighten its"
+                          " pictures by one factor"),
     "unrectified-views": Kind("warning", "stereo matching searches along the rows, and depth is missing or wrong where"
                               " they differ",
                               "prepare the recording with the calibration of both cameras: --calibration FILE"),

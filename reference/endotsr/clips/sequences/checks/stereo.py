@@ -40,6 +40,10 @@ LATE, ALIKE = 0.6, 0.75  # frames, and fraction of the sampled frames that show 
 SHIFTS, FITS, GAIN, SHORTEST = 8, 0.85, 0.25, 2
 
 
+# Brightness of one view, of that of the other (medians): at most 1.02 on two recorded and seven simulated clips.
+UNEQUAL = 1.3
+
+
 class RowMatches(NamedTuple):
     """M points that both views of a pair show, and their motion since the frame before."""
 
@@ -77,7 +81,7 @@ class PairViews:
         frozen = frozen_finding(left, right, names, where)
         still = frozen or same_finding(*self.small, names, where)
         late = late_finding(self.rows, where) or late_steps_finding(left, right, where)
-        return still or late + row_finding(self.rows, where)
+        return still or late + row_finding(self.rows, where) + unequal_finding(*self.small, where)
 
 
 def pair_findings(clip: Clip) -> list[Finding]:
@@ -101,6 +105,15 @@ def same_finding(left: list[NDArray], right: list[NDArray], names: list[str], wh
     first = int(equal.argmax())
     what = f"the right picture is the left one in {equal.sum()} of {counted(len(names), 'frame')}, first {names[first]}"
     return [finding("same-views", where, what, first)]
+
+
+def unequal_finding(left: list[NDArray], right: list[NDArray], where: str) -> list[Finding]:
+    """A warning on a right view that is far darker or brighter than the left one."""
+    ratio = float(np.median([(b.mean() + 1) / (a.mean() + 1) for a, b in zip(left, right)]))
+    if 1 / UNEQUAL < ratio < UNEQUAL:
+        return []
+    what = f"the right view is {ratio:.2f} times as bright as the left one (median; the limit is {UNEQUAL} times)"
+    return [finding("unequal-views", where, what)]
 
 
 def frozen_finding(left: FloatArray, right: FloatArray, names: list[str], where: str) -> list[Finding]:

@@ -29,10 +29,16 @@ CLEAR = 20.0  # the same of edges above the noise of a sharpened picture, if the
 # them on the same clips after unsharp masks of radius 1 and 2. Opaque text has 0.13 or more, sharpened with the tissue.
 STRONG, AMONG = 35.0, 0.08  # grey levels of those edges, and the number of sharp still ones relative to theirs
 BORDER = 4.5  # times the steps beside it: at most 3.1 in tissue on these clips, 6.0 or more between two pictures
+ALONE = 2.2  # times the largest step beside it: the blocks of JPEG have at most 1.3 at any quality, borders 3.8 or more
 BESIDE, NEXT = 12, 3  # columns on either side that are compared, without the nearest
 # Mean slope and differences in a part of one colour, grey levels, and the part of the picture: at most 0.1 % on these
 # clips, 1.7 % on three of them after H.264 at CRF 48, and 28 % with a round view in a surround of one colour.
 LEVEL, ONE_COLOUR, PLAIN = 0.25, 1.0, 0.05
+# Part of the two borders of an inset in a corner that stands out, less that of lines beside them: at most 0.17 on parts
+# of these clips, and 0.25 after JPEG of quality 40; 0.49 to 0.97 with another of them in a corner, and less where both
+# are dark at a border.
+INSET, OUTSTANDING = 0.42, 3.0  # and steps that stand out, times those beside them
+LEAST_INSET, LARGEST_INSET, LEAST_SIDE = 0.12, 0.6, 120  # parts of height and width; pixels of a picture
 LONG, FLAT = 0.3, 0.5  # part of a column that is tissue; grey levels of a picture without steps
 
 
@@ -70,7 +76,8 @@ class StillParts:
         height, width = self._sum.shape
         seen = self._tissue if outside is None else self._tissue & ~resized_nearest(outside, width, height, "mask")
         mean = Edges(self._sum / self._frames, self._slopes / self._frames, _inner(seen), self._size[1] / width)
-        return _border_findings(mean, where) or plain_findings(mean, where) or _burnt_in_findings(mean, where)
+        border = _border_findings(mean, where) or _inset_findings(mean, where)
+        return border or plain_findings(mean, where) or _burnt_in_findings(mean, where)
 
 
 class Edges(NamedTuple):
@@ -137,6 +144,52 @@ def _border_findings(edges: Edges, where: str) -> list[Finding]:
     return []
 
 
+def _inset_findings(edges: Edges, where: str) -> list[Finding]:
+    """A second picture in a corner: a straight border down and one across, which meet."""
+    (height, width), found = edges.grey.shape, (0.0, "", 0, 0)
+    if min(height, width) < LEAST_SIDE:
+        return []
+    marked = [_outstanding(slope, axis) & edges.seen for slope, axis in zip(edges.slopes, (1, 0))]
+    for down, across in np.ndindex(2, 2):
+        turn = (slice(None, None, -1 if down else 1), slice(None, None, -1 if across else 1))
+        lines = [_standing_out(part[turn], axis) for part, axis in zip(marked, (0, 1))]
+        both = np.minimum(*lines)[: int(LARGEST_INSET * height), : int(LARGEST_INSET * width)]
+        both[: int(LEAST_INSET * height)] = both[:, : int(LEAST_INSET * width)] = 0
+        row, column = np.unravel_index(both.argmax(), both.shape)
+        corner = f"{('upper', 'lower')[down]} {('left', 'right')[across]}"
+        found = max(found, (float(both[row, column]), corner, int(row), int(column)))
+    part, corner, row, column = found
+    if part < INSET:
+        return []
+    size = f"{round(column * edges.factor)}x{round(row * edges.factor)}"
+    what = (
+        f"straight borders cut off a part of about {size} pixels in the {corner} corner, as of a second picture there"
+    )
+    return [finding("straight-border", where, what)]
+
+
+def _outstanding(slope: FloatArray, axis: int) -> BoolArray:
+    """Where a step is larger than those beside it."""
+    from scipy.ndimage import uniform_filter1d
+
+    wide, near = 2 * BESIDE + 1, 2 * NEXT - 1
+    whole, middle = (size * uniform_filter1d(slope, size, axis) for size in (wide, near))
+    return slope > OUTSTANDING * np.maximum((whole - middle) / (wide - near), FLAT)
+
+
+def _standing_out(marked: BoolArray, axis: int) -> FloatArray:
+    """(h, w) part of the line from the border of the picture to each pixel along `axis` that is marked, less the most
+    of the lines beside it; within a pixel."""
+    from scipy.ndimage import maximum_filter
+
+    part = np.cumsum(marked, axis, dtype=np.float32) / np.expand_dims(np.arange(1, marked.shape[axis] + 1), 1 - axis)
+    beside = np.zeros_like(part)
+    for shift in range(NEXT, BESIDE + 1):
+        for way in (-shift, shift):
+            np.maximum(beside, np.roll(part, way, 1 - axis), out=beside)
+    return np.asarray(maximum_filter(part - beside, 3))
+
+
 def _border(slope: FloatArray, seen: BoolArray, axis: int) -> tuple[float, int]:
     """The largest step of a column (axis 0) or row (axis 1), relative to those beside it, and its place."""
     counts = seen.sum(axis=axis)
@@ -148,7 +201,7 @@ def _border(slope: FloatArray, seen: BoolArray, axis: int) -> tuple[float, int]:
         beside = np.concatenate([profile[max(0, place - BESIDE) : max(0, place - NEXT)],
                                  profile[place + NEXT + 1 : place + BESIDE + 1]])  # fmt: skip
         beside = beside[np.isfinite(beside)]
-        if beside.size >= BESIDE - NEXT:
+        if beside.size >= BESIDE - NEXT and profile[place] > ALONE * beside.max():
             best = max(best, (float(profile[place] / max(np.median(beside), FLAT)), int(place)))
     return best
 

@@ -1,4 +1,6 @@
-"""What `endotsr prepare` sees of the frames that it writes: the share of tissue, dark borders, the usual depth."""
+"""What `endotsr prepare` sees of the frames that it writes, by the checks of `endotsr check` that need one pass."""
+
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,14 +10,18 @@ from endotsr.clips.sequences.checks.colour_planes import ColourPlanes
 from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.depth import rim_finding
 from endotsr.clips.sequences.checks.depth_rims import blended_rim
+from endotsr.clips.sequences.checks.depth_steps import DepthSteps
 from endotsr.clips.sequences.checks.exchanged import MaskOrder
+from endotsr.clips.sequences.checks.flips import DepthTurns
 from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.held import HeldMasks
 from endotsr.clips.sequences.checks.late import LateParts
 from endotsr.clips.sequences.checks.masks import MaskTurns
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
+from endotsr.clips.sequences.checks.specks import Specks
+from endotsr.clips.sequences.checks.stereo import PairViews
 from endotsr.clips.sequences.checks.still_parts import StillParts
-from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.field_of_view import FieldOfView
 from endotsr.method.kernels.arrays import BoolArray
 
@@ -31,9 +37,16 @@ class WrittenFrames:
         self.still, self.planes, self.frames = StillParts(count), ColourPlanes(count), 0
         self.blended: list[float] = []
         self.order, self.turns, self.held, self.late = MaskOrder(), MaskTurns(), HeldMasks(), LateParts()
+        self.specks, self.pairs = Specks(), PairViews(count)
+        self.depths = DepthTurns(), DepthSteps(count)
 
-    def add(self, picture: NDArray[np.uint8], tissue: BoolArray | None, depth: NDArray[np.float32] | None) -> None:
-        """One frame: picture (H, W, 3), tissue (H, W) or None without masks, depth (H, W) or None, 0 = missing."""
+    def add(self, pair: PicturePair, tissue: BoolArray | None, depth: NDArray[np.float32] | None) -> None:
+        """One frame: pictures (H, W, 3), tissue (H, W) or None without masks, depth (H, W) or None, 0 = missing."""
+        picture, (turns, steps) = pair.left, self.depths
+        self.pairs.add(self.frames, picture, pair.right)
+        self.specks.add(self.frames, tissue)
+        turns.add(self.frames, depth)
+        steps.add(self.frames, picture, depth, tissue)
         self.view.add(picture, tissue)
         self.still.add(self.frames, picture, tissue)
         self.planes.add(self.frames, picture)
@@ -58,9 +71,12 @@ class WrittenFrames:
             excluded = clip.masks.excluded_value
             against = self.masks.flip_findings(where) or self.masks.findings(where, excluded)
             notes += notes_of(against) or [self.masks.note(excluded)]
-            notes += notes_of([*self.turns.findings(where), *self.order.findings(where), *self.held.findings(where)])
+            parts = self.turns, self.order, self.held, self.specks
+            notes += notes_of([found for part in parts for found in part.findings(where)])
             notes += notes_of(self.late.findings(where, where))
             notes += notes_of(border_findings(self.view, where)) if border == "auto" else []
+        notes += notes_of([found for part in self.depths for found in part.findings(where)])
+        notes += notes_of(self.pairs.findings([Path(where) / name for name in clip.names]))
         notes += notes_of(self.still.findings(where) + self.planes.findings(where) + rim_finding(self.blended, where))
         return notes + self._depth_notes(clip)
 
