@@ -216,16 +216,22 @@ def _refused(field: Field, word: str) -> InputError:
 
 
 def _written_out(field: Field, word: str) -> str:
-    """Advice for a number with a suffix, such as 1k or 1.5M; "" for other words, or if the option has no numbers."""
-    found = re.fullmatch(r"(\d+\.?\d*|\.\d+)([kKM])", word)
-    if found is None:
+    """Advice for numbers as people write them: 1k, 29,97, 4mm, or several with commas; "" for other words."""
+    if field.count != 1 and re.fullmatch(r"[-\d., ;]+[,;][-\d., ;]+", word):
+        return f", apart from the others: {field.name} {' '.join(re.split('[,; ]+', word.strip(',; ')))}"
+    if found := re.fullmatch(r"(\d+\.?\d*|\.\d+)([kKM])", word):
+        number, advice = f"{float(found[1]) * THOUSANDS[found[2]]:.15g}", "written out"
+    elif re.fullmatch(r"-?\d*,\d+", word):
+        number, advice = word.replace(",", "."), "with a decimal point"
+    elif found := re.fullmatch(r"(-?\d+\.?\d*|-?\.\d+)\s*[^\d\s.,]\D*", word):
+        number, advice = found[1], "without a unit"
+    else:
         return ""
-    number = f"{float(found[1]) * THOUSANDS[found[2]]:.15g}"
     try:
         converted(field.item, number)
     except ValueError:
         return ""
-    return f", written out ({number})"
+    return f", {advice} ({number})"
 
 
 def _built(options: type[T], fields: list[Field], given: dict[tuple[str, ...], Any], default: T | None) -> T:

@@ -6,6 +6,7 @@ OpenCV's pixel coordinates, with pixel centres at integers. A pair satisfies x_r
 """
 
 import configparser
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -155,7 +156,7 @@ def _number(word: str) -> float:
 def read_matrix(path: Path) -> FloatArray:
     """K (3, 3) from nine numbers row by row, or twelve (3x4, Hamlyn) with a last column of 0. Raises InputError."""
     text = read_text(path, LARGEST_MATRIX)
-    words = text.replace(",", " ").replace("[", " ").replace("]", " ").split()
+    words = re.sub(r"[,;\[\]]", " ", text).split()
     try:
         numbers = np.array([float(word) for word in words])
     except ValueError:

@@ -3,6 +3,7 @@
 In: a `Clip` and option values. Out: frame numbers, or an edited `Clip`.
 """
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -23,6 +24,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.names import counted
 
+SECONDS = re.compile(r"(\d|\.)\s*s\b")
 ALLOWED = "use frames A:B[:S] or N, seconds As:Bs, several with commas, such as 0:10,12,30s:45s"
 
 
@@ -41,7 +43,7 @@ def chosen_frames(text: str, clip: Clip, option: str = "--frames") -> list[int]:
     found: set[int] = set()
     for part in text.split(","):
         try:
-            frames = _seconds(part.strip(), clip) if "s" in part else _numbers(part.strip(), clip.count)
+            frames = _seconds(part.strip(), clip) if SECONDS.search(part) else _numbers(part.strip(), clip.count)
         except InputError as error:
             raise InputError(f"{option} {error}") from None
         if not frames:

@@ -32,7 +32,7 @@ from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.json import read_json, text
 from endotsr.untrusted.sections import choice
 
-PROPOSAL = "proposal.json"  # next to a folder of masks that a program proposed
+PROPOSAL, MASKS = "proposal.json", "masks"  # next to a folder of masks that a program proposed; that folder
 MASK_ENDINGS = (*PICTURE_ENDINGS, *ARRAY_ENDINGS)
 LARGEST_MARK = 1 << 16  # bytes of this file
 
@@ -117,8 +117,10 @@ def stated_masks(
     """
     if options.masks is None:
         return None
-    files = mask_files(options.masks) or files_of(options.masks, MASK_ENDINGS)
-    mark = options.masks.parent / PROPOSAL
+    proposed = (options.masks / PROPOSAL).is_file() and (options.masks / MASKS).is_dir()
+    where = options.masks / MASKS if proposed else options.masks  # of the folder that `endotsr masks` wrote
+    files = mask_files(where) or files_of(where, MASK_ENDINGS)
+    mark = where.parent / PROPOSAL
     both = paired(frames, files, options.pairing, source_names)
     found = masks_of(both.files, options.excluded_value, width, height, mark.is_file())
     found = replace(found, paired=both.note)

@@ -17,6 +17,8 @@ ARCHIVES = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz", ".zst")
 OTHER_PICTURES = (".heic", ".heif", ".avif", ".jp2", ".j2k", ".jxl", ".gif", ".tga", ".ppm", ".pgm", ".dng", ".psd",
                   ".exr", ".hdr", ".pnm", ".pbm")  # fmt: skip
 ARRAYS = (".npy", ".npz", ".mat", ".h5", ".hdf5", ".pkl", ".bag")
+RECORDINGS = {".db3": "a ROS bag", ".mcap": "a ROS bag", ".svo": "a recording of a ZED camera",
+              ".svo2": "a recording of a ZED camera", ".pptx": "a presentation", ".pdf": "a document"}  # fmt: skip
 AS_PICTURES = "frames in arrays are not read; write each as a png picture"
 JPEG_NAMES = (".jfif", ".jpe", ".jif")  # of pictures that a browser saved
 DICOM_ENDINGS = (".dcm", ".dicom", "")  # recorders also write names without an ending
@@ -36,6 +38,8 @@ def not_there(path: Path) -> str:
         return "is an address; download the file, and give its path"
     if re.search(r"[*?]|%\d*d", path.name):
         return f"not found; give the folder of the pictures, {path.parent}, without a pattern"
+    if "\\" in text and Path(text.replace("\\", "/")).exists():
+        return f"not found; write strokes in place of backslashes: {text.replace(chr(92), '/')}"
     return "not found"
 
 
@@ -47,6 +51,8 @@ def _of_file(path: Path) -> str:
         return f": {AS_PICTURES}"
     if ending in ARCHIVES:
         return ": an archive; unpack it first"
+    if ending in RECORDINGS:
+        return f": {RECORDINGS[ending]}; export its pictures as a video or as PNG files"
     return ": a video in a format that is not read; convert it to mp4" if ending in OTHER_VIDEOS else ""
 
 

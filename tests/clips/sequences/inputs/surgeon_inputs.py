@@ -1,11 +1,26 @@
 """Rows of `inputs_tried.py` about clips of capture cards and consoles, and files in each other's place."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from builders import builder
 from depth_folders import true_depth
-from input_kinds import OPENCV, Row, calibrated, folder_of, prepare, video
+from input_kinds import (
+    OPENCV,
+    Row,
+    calibrated,
+    centred,
+    folder_of,
+    frames_changed,
+    half_excluded,
+    mask,
+    masked,
+    pair,
+    prepare,
+    public,
+    video,
+)
 from made_videos import HEIGHT, WIDTH, files, picture, pictures
 from scipy.ndimage import zoom
 from still_text import FRAMES, tissue, with_text
@@ -73,7 +88,61 @@ def bars(shown: np.ndarray) -> np.ndarray:
     return np.hstack([side, shown, side])
 
 
+def of_the_masks_command(folder: Path) -> list[str]:
+    """The folder that `endotsr masks` wrote, with its pictures, in place of the masks in it."""
+    words = masked([mask()] * 12)(folder)
+    (folder / "found").mkdir()
+    (folder / "m").rename(folder / "found/masks")
+    (folder / "found/proposal.json").write_text("{}")
+    write_png(folder / "found/proposed_masks.png", pictures()[0])
+    return [*words[: words.index("--masks") + 1], str(folder / "found")]
+
+
+def with_inset(frame: np.ndarray, i: int) -> np.ndarray:
+    """Another moment of the same tissue, small and brightened, in a corner."""
+    found = frame.copy()
+    found[:64, -80:] = 255 - tissue(FRAMES - 1 - i)[::3, ::3][:64, :80]
+    return found
+
+
+def blended(folder: Path) -> list[str]:
+    shown = [tissue(i).astype(int) for i in range(FRAMES)]
+    files(folder, "clip", [p.astype(np.uint8) for a, b in pairwise(shown) for p in (a, (a + b) // 2)])
+    return prepare("clip", camera=WIDE)(folder)
+
+
+def named_file(name: str):
+    def make(folder: Path) -> list[str]:
+        (folder / name).write_bytes(bytes(99))
+        return prepare(name)(folder)
+
+    return make
+
+
 SURGEON_ROWS = [
+    Row("masks, the folder that endotsr masks wrote", of_the_masks_command, "right", "", half_excluded),
+    Row("camera, numbers with commas", folder_of(pictures(), "--camera", "100,100,64,48"), "refused",
+        "use a number, apart from the others: --camera 100 100 64 48"),
+    Row("crop as ImageMagick writes it", folder_of(pictures(), "--crop", "100x80+10+10"), "refused",
+        "--crop '100x80+10+10' is not allowed; use an integer"),
+    Row("rate with a decimal comma", folder_of(pictures(), "--source-rate", "29,97"), "refused",
+        "use a number, with a decimal point (29.97)"),
+    Row("baseline with a unit", folder_of(pictures(), "--baseline", "4.2 mm"), "refused",
+        "use a number, without a unit (4.2)"),
+    Row("frames in words", folder_of(pictures(), "--frames", "first"), "refused", "'first': not a range"),
+    Row("nerfstudio, paths of another machine", public("nerfstudio", change=frames_changed(
+        file_path=lambda frame: f"/home/a/{frame['file_path']}")), "refused",
+        "is an absolute path; write it from the folder of the file"),
+    Row("calibration, CSV with semicolons", calibrated("K.csv", "100;0;63.5\n0;101;47.5\n0;0;1\n"), "told",
+        "half a pixel", centred),
+    Row("a path with backslashes", lambda folder: [w.replace("/clip", "\\clip") for w in folder_of(pictures())(folder)],
+        "refused", "not found; write strokes in place of backslashes"),
+    Row("a bag of ROS 2", named_file("a.db3"), "refused", "a ROS bag; export its pictures"),
+    Row("a presentation", named_file("a.pptx"), "refused", "a presentation; export its pictures"),
+    Row("pictures, another clip in a corner", of_tissue(with_inset), "told", "in the upper right corner"),
+    Row("pictures, every second one blended", blended, "told", "every second picture is the mean of its neighbours"),
+    Row("stereo, a right view that is dark", pair(frames=(pictures(), [p // 2 for p in pictures()])), "told",
+        "unequal-views"),
     Row("pictures, text of a console", of_tissue(lambda shown, i: with_text(shown)), "told", "burnt-in"),
     Row("pictures, two recordings side by side", of_tissue(lambda shown, i: np.hstack([shown,
         255 - tissue(FRAMES - 1 - i)])), "told", "a straight border crosses the pictures at column"),

@@ -5,6 +5,7 @@ integers, masks are black on excluded pixels, and depth files store thousandths 
 `applied_scale`, which no field states. `FIELDS` lists all fields.
 """
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.json import Keys, integer, listed, number, read_json
-from endotsr.untrusted.names import counted, relative_path
+from endotsr.untrusted.names import counted, relative_path, shown
 from endotsr.untrusted.sections import choice
 from endotsr.untrusted.yaml import matrix
 
@@ -247,7 +248,9 @@ def _inside(
 
 
 def _named(folder: Path, name: Any, where: str) -> Path | None:
-    """The file of this name, which may be written with the separators of another system."""
+    """The file of this name, which may be written with the separators of another system. Raises InputError."""
+    if isinstance(name, str) and re.match(r"[/\\]|[A-Za-z]:", name):
+        raise InputError(f"{where}: {shown(name)} is an absolute path; write it from the folder of the file")
     return None if name is None else folder / relative_path(str(name).replace("\\", "/").removeprefix("./"), where)
 
 
