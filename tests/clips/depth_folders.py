@@ -44,22 +44,12 @@ def scaled(values, top, kind):
 
 WRONG = {  # what the files hold: values, name of the folder, ending, what the message says
     "disparity in pixels": (lambda i: 4 * disparity(i), "depth", "npy", "increases with depth (rank correlation"),
-    "relative inverse depth": (
-        lambda i: 1800 / true_depth(i) - 3,
-        "depth",
-        "npy",
-        "increases with depth (rank correlation",
-    ),
+    "relative inverse depth": (lambda i: 1800 / true_depth(i) - 3, "depth", "npy", "increases with depth (rank corr"),
     "disparity by its name": (lambda i: 4 * disparity(i), "disparity_raft", "npy", "indicates a disparity"),
     "a network by its name": (lambda i: true_depth(i), "depth_anything_v2", "npy", "indicates a disparity or a rel"),
     "stretched to 8 bits": (lambda i: scaled(true_depth(i), 255, np.uint8), "depth", "png", "of every frame is 255"),
     "stretched to 16 bits": (lambda i: scaled(true_depth(i), 65535, np.uint16), "depth", "png", "frame is 65535"),
     "stretched to 0 to 1": (lambda i: scaled(disparity(i), 1.0, np.float32), "depth", "npy", "of every frame is 1"),
     "disparity times 256": (lambda i: (disparity(i) * 256).astype(np.uint16), "depth", "png", "the median depth is"),
-    "metres": (
-        lambda i: true_depth(i) / 1000,
-        "depth",
-        "npy",
-        "like metres; state another unit with --depth-unit",
-    ),
+    "metres": (lambda i: true_depth(i) / 1000, "depth", "npy", "like metres; state another unit with --depth-unit"),
 }

@@ -31,18 +31,9 @@ def picture(shift):
 def two_frames(shift, mask=None, depth=5.0):
     images = np.stack([picture(0.0), picture(shift)]).round().astype(np.uint8)
     masks = np.ones((2, HEIGHT, WIDTH), bool) if mask is None else mask
-    return Sequence(
-        images=images,
-        masks=masks,
-        depth=np.full((2, HEIGHT, WIDTH), depth, np.float32),
-        times=np.array([0.0, 0.5]),
-        cameras=[CAMERA] * 2,
-        names=["a", "b"],
-        unit="scene units",
-        static_camera=True,
-        train_index=np.array([0, 1]),
-        test_index=np.array([], int),
-    )
+    prior, times = np.full((2, HEIGHT, WIDTH), depth, np.float32), np.array([0.0, 0.5])
+    train, test = np.array([0, 1]), np.array([], int)
+    return Sequence(images, masks, prior, times, [CAMERA] * 2, ["a", "b"], "scene units", True, train, test)
 
 
 def constant(shift):

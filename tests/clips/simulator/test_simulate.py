@@ -87,29 +87,16 @@ def test_true_flow_agrees_with_the_pictures(everything):
 
 
 # What an effect may change beside the pictures: tissue mask, depth prior, true geometry, cameras.
-MAY_CHANGE = {
-    "breathing": {"images", "depth", "truth"},
-    "pulsation": {"images", "depth", "truth"},
-    "pull": {"images", "depth", "truth"},
-    "exposure": {"images"},
-    "brightening": {"images"},
-    "highlights": {"images"},
-    "instrument": {"images", "masks", "depth"},
-    "camera_motion": {"images", "depth", "truth", "cameras"},
-    "noise": {"images"},
-    "depth_errors": {"depth"},
-    "cutting": {"images", "depth", "truth"},
-    "bleeding": {"images"},
-    "second_light": {"images"},
-    "more_instruments": {"images", "masks", "depth"},
-    "shadows": set(),  # without instruments
-    "smoke": {"images"},
-    "vignetting": {"images"},
-    "auto_exposure": {"images"},
-    "motion_blur": set(),  # without motion
-    "stereo": {"masks", "depth"},
-    "depth_rounding": {"depth"},
+BY_CHANGE = {
+    "images": "exposure auto_exposure brightening second_light highlights noise bleeding smoke vignetting",
+    "images depth truth": "breathing pulsation pull cutting",
+    "images depth truth cameras": "camera_motion",
+    "images masks depth": "instrument more_instruments",
+    "masks depth": "stereo",
+    "depth": "depth_errors depth_rounding",
+    "": "shadows motion_blur",  # without instruments, and without motion
 }
+MAY_CHANGE = {effect: set(parts.split()) for parts, effects in BY_CHANGE.items() for effect in effects.split()}
 
 
 @pytest.mark.parametrize("effect", EFFECTS)

@@ -21,11 +21,5 @@ def made_up(images: np.ndarray, test: list[int], masks: np.ndarray | None = None
     if masks is None:
         masks = np.ones((count, *images.shape[2:]), bool)
     train = [i for i in range(count) if i not in test]
-    return MadeUpSequence(
-        images,
-        masks,
-        np.arange(count) / count,
-        np.array(train, int),
-        np.array(test, int),
-        [f"frame-{i:06d}.png" for i in range(count)],
-    )
+    names, times = [f"frame-{i:06d}.png" for i in range(count)], np.arange(count) / count
+    return MadeUpSequence(images, masks, times, np.array(train, int), np.array(test, int), names)
