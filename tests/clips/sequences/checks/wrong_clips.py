@@ -90,8 +90,9 @@ WRONG = {
     "one mask with a hole": (lambda p: each(p, "masks", holed, [4]), "unlike-mask", "warning", 4),
     "masks of noise": (lambda p: each(p, "masks", noisy), "speckled-masks", "warning", None),
     "masks upside down": (lambda p: upside_down(p), "flipped-masks", "warning", None),
-    "brightness grows with depth": (lambda p: (each(p, "depth", sloped), each(p, "images", lit_from_afar)),
-                                    "depth-against-light", "warning", None),
+    "brightness grows with depth": (lambda p: (each(p, "depth", sloped), each(p, "images",
+        lambda image: (image * np.linspace(0.3, 1, len(image))[:, None, None]).astype(np.uint8))),
+        "depth-against-light", "warning", None),
     "one depth upside down": (lambda p: (each(p, "depth", sloped), each(p, "depth", lambda x: x[::-1], [4])),
                               "flipped-depth", "warning", 4),
     "masks empty": (lambda p: each(p, "masks", lambda x: x * 0), "tissue-fraction", "refusal", None),
@@ -99,8 +100,10 @@ WRONG = {
     "numbers with a gap": (renamed, "number-gap", "warning", 5),
     "duplicated frame": (lambda p: copied(p, 3, 4), "duplicated-frame", "warning", 4),
     "a frame that returns": (lambda p: copied(p, 2, 6), "returning-frames", "warning", 6),
-    "one picture without its colours": (lambda p: each(p, "images", colourless, [4]), "colour-jump", "warning", 4),
-    "another light": (lambda p: each(p, "images", blue_light, range(4, FRAMES)), "colour-jump", "warning", 4),
+    "one picture without its colours": (lambda p: each(p, "images", lambda image: np.repeat(image[:, :, 1:2], 3, 2),
+        [4]), "colour-jump", "warning", 4),
+    "another light": (lambda p: each(p, "images", lambda image: (image * [0.6, 1.0, 1.0]).astype(np.uint8), range(4,
+        FRAMES)), "colour-jump", "warning", 4),
     "a picture that was not decoded to its end": (lambda p: each(p, "images", half_decoded, [3]), "plain-frame",
                                                   "warning", 3),
     "masks of two polarities": (lambda p: each(p, "masks", lambda x: 255 - x, range(4, FRAMES)), "turned-masks",
@@ -192,10 +195,6 @@ def sloped(depth):
     return np.where(depth > 0, 40 + np.arange(len(depth))[:, None] // 2, 0).astype(depth.dtype)
 
 
-def lit_from_afar(image):
-    return (image * np.linspace(0.3, 1, len(image))[:, None, None]).astype(np.uint8)
-
-
 def tenths(depth):
     """Fine depth of a slope, in tenths of millimetres, of which a byte keeps the remainder of 256."""
     y, x = np.indices(depth.shape[:2])
@@ -220,14 +219,6 @@ def holed(mask):
     """Another 13 % of the pixels excluded, as where stereo matching fails. Masks two apart differ in 7 %."""
     mask[4:24, 25:45] = 255
     return mask
-
-
-def colourless(image):
-    return np.repeat(image[:, :, 1:2], 3, 2)
-
-
-def blue_light(image):
-    return (image * [0.6, 1.0, 1.0]).astype(np.uint8)
 
 
 def half_decoded(image):

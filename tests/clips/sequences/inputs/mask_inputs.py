@@ -77,10 +77,6 @@ def void() -> np.ndarray:
     return plane
 
 
-def mixed_depth(folder: Path) -> None:
-    write_png(folder / "0003.png", mask().astype(np.uint16) * 257)
-
-
 @builder
 def with_tool(folder: Path, masks: list[np.ndarray], *words: str) -> list[str]:
     """Red tissue and a grey instrument in the left columns, with these masks."""
@@ -114,7 +110,8 @@ MASK_ROWS = [
         "refused", "the largest of all pictures is 64"),
     Row("masks, 0 and 1 in one of them", masked([mask(1) if i == 3 else mask() for i in range(12)]), "refused",
         "areas of the number 1"),
-    Row("masks, one of 16 bits", masked([mask()] * 12, change=mixed_depth), "refused", "one bit depth"),
+    Row("masks, one of 16 bits", masked([mask()] * 12, change=lambda folder: write_png(folder / "0003.png",
+        mask().astype(np.uint16) * 257)), "refused", "one bit depth"),
     Row("masks, inverted, in prepare", with_tool([255 - mask()] * 12), "told",
         "68.8% would be"),
     Row("masks, inverted, in prepare, the remedy", with_tool([255 - mask()] * 12, "--excluded-value", "black"), "told",

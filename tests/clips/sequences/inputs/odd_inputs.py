@@ -92,10 +92,6 @@ def hole_is_empty(folder: Path) -> bool:
     return not plane[HOLE].any() and bool((plane[:, 30:] > 0).all())
 
 
-def float_tiff(path: Path, plane: np.ndarray) -> None:
-    Image.fromarray(plane.astype(np.float32)).save(path)
-
-
 def coloured(i: int):
     """A picture of depth in false colours."""
     near = np.clip(4 * (true_depth(i) - 40), 0, 255).astype(np.uint8)
@@ -161,7 +157,8 @@ ODD_ROWS = [
     Row("depth, 1e6 where there is none", depth(marked(1e6)), "refused", "mark pixels without depth"),
     Row("depth, 65535 where there is none", depth(lambda i: marked(65535)(i).astype(np.uint16), kind="png"), "refused",
         "mark pixels without depth"),
-    Row("depth, float TIFF", depth_files(float_tiff, ".tiff"), "right", "", depth_is_true),
+    Row("depth, float TIFF", depth_files(lambda path, plane: Image.fromarray(plane.astype(np.float32)).save(path),
+        ".tiff"), "right", "", depth_is_true),
     Row("depth, false colours", depth(coloured, kind="png"), "refused", "one grey channel expected"),
     Row("camera in parts of the picture", with_camera("0.78", "1.04", "0.5", "0.5"), "told", "field-of-view"),
     Row("camera in millimetres", with_camera("4.2", "4.2", "64", "48"), "told", "field-of-view"),

@@ -265,10 +265,6 @@ def public_endonerf(folder: Path, *names: str) -> list[str]:
     return prepare("clip", camera=())(folder)
 
 
-def one_more_picture(raw: Path) -> None:
-    shutil.copy(raw / "images/frame_00000.png", raw / "images/frame_00099.png")
-
-
 def of_orb_slam(folder: Path) -> None:
     """A TUM folder as ORB-SLAM leaves it: its trajectory and its settings, no true one."""
     (folder / "groundtruth.txt").rename(folder / "CameraTrajectory.txt")
@@ -372,7 +368,8 @@ PICTURES = [
         "read as seconds", timed([0, 100, 400, 900])),
     Row("COLMAP, points that points3D lacks", colmap(change=reworded("sparse/0/points3D.txt",
         first_to_last(0, -3))), "told", "are not in points3D"),
-    Row("nerfstudio, pictures that the file does not list", public("nerfstudio", change=one_more_picture), "told",
+    Row("nerfstudio, pictures that the file does not list", public("nerfstudio",
+        change=lambda raw: shutil.copy(raw / "images/frame_00000.png", raw / "images/frame_00099.png")), "told",
         "not listed in transforms.json and are left out"),
     Row("TUM, trajectory and settings of ORB-SLAM", raw(raw_sources.tum, change=of_orb_slam), "told",
         "poses of CameraTrajectory.txt",

@@ -88,10 +88,6 @@ def one_plane(clip: Path) -> None:
         write_png(file, first)
 
 
-def has_no_depth_command(folder: Path) -> bool:
-    return read_sequence_file(folder / "o").camera.baseline == 4
-
-
 MILLISECONDS = [40.0 * i for i in range(5)]
 STRANGE_ROWS = [
     Row("camera, cx and cy exchanged", lens(size=(160, 128), camera=("--camera", "142", "142", "64", "80")), "told",
@@ -99,7 +95,7 @@ STRANGE_ROWS = [
     Row("camera, distortion of another lens", lens("--distortion", "-0.9", "0", "0", "0"), "told",
         "turns back inside the picture"),
     Row("camera, one with a baseline", folder_of(pictures(), "--baseline", "4"), "told", "next: endotsr poses",
-        has_no_depth_command),
+        lambda folder: read_sequence_file(folder / "o").camera.baseline == 4),
     Row("depth, bytes exchanged", depth_files(exchanged_bytes, ".png", "--depth-scale", "0.01"), "refused",
         "two bytes of each number exchanged"),
     Row("depth, of one frame for all, check", common(change=one_plane), "told", "the depth of 5 frames is that of 1"),

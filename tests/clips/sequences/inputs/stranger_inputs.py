@@ -82,11 +82,6 @@ def empty(folder: Path) -> list[str]:
     return prepare("clip")(folder)
 
 
-def marked_frame(i: int):
-    """True depth, and in one frame -1 everywhere."""
-    return true_depth(i) * 0 - 1 if i == 3 else true_depth(i)
-
-
 def zipped(folder: Path) -> list[str]:
     files(folder, "clip", pictures())
     with zipfile.ZipFile(folder / "clip.zip", "w") as archive:
@@ -103,22 +98,10 @@ def npy(kind):
     return lambda path, plane: np.save(path, plane.astype(kind))
 
 
-def three_channels(path: Path, plane) -> None:
-    write_png(path, np.repeat(plane.round().astype(np.uint8)[..., None], 3, axis=2))
-
-
 def quotes(folder: Path) -> list[str]:
     """A folder whose name has spaces, quotes and a dollar sign."""
     files(folder, "my 'clip' \"1\" $HOME", pictures())
     return prepare("my 'clip' \"1\" $HOME")(folder)
-
-
-def as_jpg_too(folder: Path) -> None:
-    write_jpeg(folder / "clip/0003.jpg", read_png(folder / "clip/0003.png"))
-
-
-def newline(path: Path) -> None:
-    path.rename(path.with_name("00\n03.png"))
 
 
 def letterbox(count=12):
@@ -159,7 +142,8 @@ STRANGER_ROWS = [
     Row("pictures, one empty file", one_file(lambda path: path.write_bytes(b"")), "refused", "0003.png"),
     Row("pictures, one with zeros inside", one_file(zeroed), "refused", "0003.png"),
     Row("pictures, a link to itself", one_file(looped), "refused", "0003.png"),
-    Row("pictures, a name with a line break", one_file(newline), "refused", "use"),
+    Row("pictures, a name with a line break", one_file(lambda path: path.rename(path.with_name("00\n03.png"))),
+        "refused", "use"),
     Row("names with spaces, quotes and a dollar sign", quotes, "right", "", close(pictures(), 0.01)),
     Row("names in capitals", named(lambda k: f"{k:04d}.PNG"), "right", "", close(pictures(), 0.01)),
     Row("a folder above the pictures", calibrated("calib.txt", P.format("P2", 4), folders=["first try"]), "refused",
@@ -177,7 +161,8 @@ STRANGER_ROWS = [
     Row("depth, EXR", depth_files(exr, ".exr"), "refused", "OpenEXR is not read; convert it"),
     Row("depth, half-float npy", depth_files(npy(np.float16), ".npy"), "right", ""),
     Row("depth, int32 npy", depth_files(npy(np.int32), ".npy"), "right", ""),
-    Row("depth, grey with three channels", depth_files(three_channels, ".png"), "right", ""),
+    Row("depth, grey with three channels", depth_files(lambda path, plane: write_png(path,
+        np.repeat(plane.round().astype(np.uint8)[..., None], 3, axis=2)), ".png"), "right", ""),
     Row("depth, steps stated", depth_files(lambda path, plane: np.save(path, (plane * 256).astype(np.uint16)), ".npy",
         "--depth-scale", "0.00390625"), "right", "", depth_is_true),
     Row("camera of another size", with_camera("1000", "1000", "960", "540"), "refused",
@@ -223,7 +208,8 @@ STRANGER_ROWS = [
     Row("calibration, ROS, the right camera alone", calibrated("a.yaml", ros_text(
         projection_matrix={"rows": 3, "cols": 4, "data": [float(value) for value in RIGHT]})), "told",
         "a right camera"),
-    Row("one picture twice in the folder as jpg and png", folder_of(pictures(), change=as_jpg_too), "refused",
+    Row("one picture twice in the folder as jpg and png", folder_of(pictures(),
+        change=lambda folder: write_jpeg(folder / "clip/0003.jpg", read_png(folder / "clip/0003.png"))), "refused",
         "carry the same frame number"),
     Row("calibration that is not there", missing_calibration, "refused", "scope: not found"),
     Row("calibration, YAML with tabs", calibrated("a.yaml", "camera_matrix:\n\tdata: [1]\n"), "refused",
@@ -237,7 +223,8 @@ STRANGER_ROWS = [
         "if these are two cameras"),
     Row("an empty folder", empty, "refused", "the folder is empty"),
     Row("depth, negative", depth(lambda i: -true_depth(i)), "refused", "all values are negative"),
-    Row("depth, one frame marked -1 everywhere", depth(marked_frame), "told", "frames without any depth: 3"),
+    Row("depth, one frame marked -1 everywhere", depth(lambda i: true_depth(i) * 0 - 1 if i == 3 else true_depth(i)),
+        "told", "frames without any depth: 3"),
     Row("depth, centimetres", depth(lambda i: true_depth(i) / 10), "told", "if that is too near"),
     Row("masks, red", masked([mask()] * 12, change=coloured_masks), "refused", "--excluded-value nonzero"),
     Row("EndoNeRF, a negative focal length", no_focal_length, "refused", "must be positive"),
