@@ -44,7 +44,6 @@ def test_poses_that_differ_are_a_fact():
 
 
 def test_a_camera_that_only_turns_is_said_to_turn():
-    """It moved by up to 0 mm before."""
     from scipy.spatial.transform import Rotation
 
     sequence = clip("noise")

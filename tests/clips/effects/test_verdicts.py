@@ -45,7 +45,6 @@ def test_noise_is_measured_and_moving_texture_adds_little_to_it(sigma, effects, 
 
 
 def test_held_out_frames_are_not_read():
-    """Garbage in them changes nothing."""
     sequence = clip("noise", "exposure")
     images, depth, masks = sequence.images.copy(), sequence.depth.copy(), sequence.masks.copy()
     images[sequence.test_index] = 255 - images[sequence.test_index]

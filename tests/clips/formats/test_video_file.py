@@ -95,7 +95,6 @@ def write_after(seconds, file, sound=0):
 @pytest.mark.parametrize("tag", [b"DURATION", b"DURATIOX"])  # without the tag, the length of the file counts
 @pytest.mark.parametrize(("seconds", "sound"), [(0, 0), (60, 0), (0, 200)])
 def test_a_late_clock_or_a_longer_sound_does_not_make_a_video_truncated(tag, seconds, sound, tmp_path):
-    """The end was held against the length from the first picture: a clock that begins at 60 s missed a minute."""
     file = write_after(seconds, tmp_path / "a.mkv", sound)
     file.write_bytes(file.read_bytes().replace(b"DURATION", tag))
     assert not video_facts(file).remarks

@@ -173,7 +173,6 @@ def test_the_command_carries_the_masks_of_a_folder(tmp_path, capsys):
 
 
 def test_a_source_that_is_not_prepared_gets_its_masks_in_a_folder(tmp_path, capsys):
-    """The command that the page names is the one that works, also in the second round."""
     (tmp_path / "my clip").mkdir()
     pictures, keys = tmp_path / "my clip" / "images", tmp_path / "keys"
     pictures.mkdir()
@@ -206,7 +205,6 @@ def files_in(folder: Path) -> dict[Path, bytes]:
 
 
 def test_proposed_masks_join_and_replace_no_input(tmp_path, capsys, monkeypatch):
-    """A proposal was written between the pictures, and keys inside the replaced masks were deleted."""
     for name in ("raw/images", "keys", "earlier/masks/keys"):
         (tmp_path / name).mkdir(parents=True)
     for name in "abc":

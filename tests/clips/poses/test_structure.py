@@ -214,7 +214,6 @@ def test_without_depth_a_scope_that_does_not_clearly_move_is_left_as_it_is(tmp_p
 @needs_pycolmap
 @pytest.mark.timeout(900)
 def test_the_path_of_a_hand_held_clip_without_depth(tmp_path):
-    """12 frames, 320x256."""
     views, true = hand_held(12)
     folder = written(tmp_path / "clip", views, depth=False)
     report = enter_structure(folder)

@@ -74,7 +74,6 @@ def test_seconds_need_a_rate_and_follow_time_stamps():
 
 
 def test_a_prepared_folder_is_told_where_its_rate_is_stated(tmp_path, capsys):
-    """--source-rate, which was named, is refused for it."""
     written(tmp_path / "clip")
     for words in (["--rate", "5"], ["--frames", "0s:1s"]):
         assert main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), *words]) == 2
@@ -83,14 +82,12 @@ def test_a_prepared_folder_is_told_where_its_rate_is_stated(tmp_path, capsys):
 
 
 def test_separate_pairs_have_no_rate_to_state():
-    """--source-rate is refused for SERV-CT, so it is no remedy there."""
     with pytest.raises(InputError, match="frame rate is unknown; use a recording") as refused:
         thinned(replace(recording(), layout="servct"), [0, 1, 2], 5.0, [])
     assert "--source-rate" not in str(refused.value)
 
 
 def test_an_endonerf_folder_takes_the_rate_that_its_refusal_names(tmp_path, capsys):
-    """The layout states no times: --rate asked for --source-rate, which was refused too."""
     write_synthetic_folder(tmp_path / "clip", frames=8)
     out, base = tmp_path / "o", ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o")]
     assert main([*base, "--rate", "5"]) == 2 and "use --source-rate" in capsys.readouterr().err
@@ -128,7 +125,6 @@ def test_a_crop_outside_is_refused(window):
 
 @pytest.mark.parametrize("other", ["depth", "pictures", "camera"])
 def test_a_crop_needs_one_size(other):
-    """The window of a plane of another size shows another place, and has the size of the crop all the same."""
     camera = Intrinsics(30.0, 31.0, 16.0, 12.0, *((64, 48) if other == "camera" else (32, 24)))
     depth = Depth(lambda i: np.ones((48, 64), np.float32))
     clip = cropped(recording(intrinsics=camera, depth=depth), (5, 3, 20, 12))
@@ -156,7 +152,6 @@ def test_seconds_and_dropped_frames_of_a_video(tmp_path, capsys):
 
 
 def test_what_prepare_did_not_write_is_never_lost(tmp_path, capsys):
-    """A source inside the replaced folder, a run or notes were deleted with it."""
     written(tmp_path / "raw")
     words = ["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip")]
     assert main(words) == 0
@@ -169,7 +164,6 @@ def test_what_prepare_did_not_write_is_never_lost(tmp_path, capsys):
 
 
 def test_neither_folder_is_inside_the_other(tmp_path, capsys):
-    """A clip inside its source blocked --replace of the source; pictures of a clip replaced its depth and masks."""
     written(tmp_path / "raw")
     clip, inside = tmp_path / "clip", tmp_path / "raw/clip"
     assert main(["prepare", str(tmp_path / "raw"), "--out", str(inside)]) == 2
@@ -234,7 +228,6 @@ def test_a_folder_is_replaced_by_an_edit_of_itself_and_nothing_else_is(tmp_path,
 
 
 def test_what_a_replaced_folder_loses_is_noted(tmp_path, capsys):
-    """Depth that took minutes, masks and poses went without a word; an edit of the folder itself keeps them."""
     written(tmp_path / "clip", poses=moving())
     shutil.copytree(tmp_path / "clip/images", tmp_path / "raw")
     edit = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "clip"), "--replace"]

@@ -442,7 +442,6 @@ def test_the_working_folder_as_a_source_has_its_name(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("make", "option"), [(tum, "trajectory"), (tum, "depth"), (stereomis, "trajectory")])
 def test_an_arbitrary_unit_beside_known_lengths_is_refused(tmp_path, make, option, capsys):
-    """The numbers were written as millimetres."""
     make(tmp_path / "raw")
     words = [f"--{option}-unit", "arbitrary", *(["--camera", *map(str, CAMERA)] if make is tum else [])]
     if option == "depth":

@@ -100,7 +100,6 @@ def test_disparity_of_another_program(tmp_path, ending):
 
 @pytest.mark.parametrize("ending", [".npy", ".tiff"])
 def test_one_file_is_the_depth_of_all_frames(tmp_path, ending, capsys):
-    """As in `prepare --depth`; it was said to be a missing folder."""
     written(tmp_path / "clip", depth=False)
     plane = np.tile(np.linspace(40.0, 60.0, WIDTH, dtype=np.float32), (HEIGHT, 1))
     write_plane(tmp_path / f"rest{ending}", plane)

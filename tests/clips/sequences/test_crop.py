@@ -65,7 +65,6 @@ def test_the_camera_before_the_crop_has_the_other_findings_too():
 
 @pytest.mark.parametrize(("scale", "size", "clipped"), [("0.99", (WIDTH, HEIGHT), []), ("0.5", (16, 12), [3.0, 99.8])])
 def test_a_scale_that_changes_no_size_clips_no_depth(tmp_path, capsys, scale, size, clipped):
-    """Before, sequence.toml stated that the depth was clipped, and a training did not clip it either."""
     written(tmp_path / "clip")
     prepared(tmp_path / "clip", tmp_path / "out", "--scale", scale)
     found = read_sequence_file(tmp_path / "out")

@@ -17,7 +17,6 @@ def test_one_finding_is_not_said_as_several():
 
 
 def test_the_cost_has_units():
-    """Bytes were written as 8.801e+08, and minutes without a word."""
     cost = {"sequence_bytes": 4423680.0, "total_bytes": 880056000.0, "file_bytes": 0.0, "minutes": 5.81,
             "command_minutes": 126.4, "gaussians": 64000}  # fmt: skip
     page = check_page(Checked("clip", [], {"frames": 24, "cost": cost}, []))

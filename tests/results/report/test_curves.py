@@ -127,7 +127,6 @@ def test_terms_without_a_positive_value_have_no_chart():
 
 
 def test_more_terms_than_colours_have_dashed_curves(monkeypatch):
-    """A new term of the loss ended the report of a run with a traceback."""
     names = tuple(f"term {k}" for k in range(len(style.LIGHT.colours) + 2))
     monkeypatch.setattr(curves, "TERMS", names)
     log = [{"iteration": k, "loss": 1.0, **dict.fromkeys(names, 1.0 + k)} for k in range(3)]

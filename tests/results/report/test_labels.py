@@ -29,7 +29,6 @@ def test_labels_keep_off_lines_points_and_each_other(points):
 
 
 def test_a_gap_in_a_line_leaves_its_other_parts():
-    """One value that is not finite took the whole line out, and labels were written across it."""
     axes = new_figure(6.0, 4.0).subplots()
     axes.plot([0, 1, 2, 3, 4], [0, 0, np.nan, 0, 0])
     axes.set(xlim=(0, 4), ylim=(-1, 1))

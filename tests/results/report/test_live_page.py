@@ -145,7 +145,6 @@ def test_a_curve_without_a_value_that_the_axis_holds_is_no_chart(y):
     (1.0, 7.0, ["2", "4", "6"]), (5.0, 5.0, ["5"]),
 ])  # fmt: skip
 def test_each_grid_line_of_a_chart_has_its_own_label(low, high, labels):
-    """With three digits, the lines at 30.05 and 30.1 dB had one label."""
     svg = chart_svg("x", [ChartCurve("x", [0.0, 1.0], [low, high])], 1)
     assert re.findall(r'text-anchor="end">([^<]*)<', svg)[:-1] == labels
 

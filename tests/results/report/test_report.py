@@ -348,7 +348,6 @@ def test_the_counts_of_seldom_seen_pixels_are_of_the_frames_of_their_table():
 
 
 def test_the_time_of_a_training_that_has_not_ended_is_not_said_to_be_nothing():
-    """run.json has no seconds yet; the page said 0:00."""
     data = made_up_data()
     for seconds in (None, 0.0):
         data = replace(data, evaluation=data.evaluation | {"run": RUN | {"seconds": seconds}})

@@ -209,7 +209,6 @@ def test_a_place_that_cannot_be_written_is_an_error_of_the_file_system(tmp_path)
 
 
 def test_pictures_out_of_order_have_no_speed(tmp_path):
-    """Only the first and the last time were looked at, and the film was said to have the speed of the recording."""
     file, times = tmp_path / "a.gif", [0.0, 0.9, 0.5]
     assert film_rate(file, times, 2.0) == 15 and speed_in_words(times, 2.0, 15) == ""
     with pytest.raises(InputError, match="not in order of time"):

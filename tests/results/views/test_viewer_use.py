@@ -141,7 +141,6 @@ def test_the_error_layer_stays_while_time_moves_fast(held_out, remote):
 
 
 def test_steps_in_the_error_layer_go_to_the_next_held_out_frame(held_out, remote):
-    """A step by one frame has the same nearest held-out frame: the keys did nothing."""
     file, frames = held_out
     shown(remote, file).value("""(() => { const layer = document.getElementById('layer'); layer.value = 'error';
       layer.dispatchEvent(new Event('change')); })()""")

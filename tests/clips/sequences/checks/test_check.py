@@ -75,7 +75,6 @@ def test_a_right_sequence_has_no_finding(sequence, tmp_path):
 
 @pytest.mark.parametrize("scale", [0.25, 2.0])
 def test_a_size_that_a_training_refuses_is_found(scale, sequence, tmp_path):
-    """16x12 pixels, and more pixels than there are. Before, `check` said that the clip was ready."""
     write_endonerf(sequence, tmp_path / "clip")
     config = msgspec.structs.replace(PAPER, sequence=SequenceConfig(scale=scale))
     (found,) = check_sequence(tmp_path / "clip", config).findings
@@ -130,7 +129,6 @@ def test_a_baseline_in_another_unit(tmp_path, baseline, unit, said):
     ("frames", "codes"), [("", {"mask"}), ("0:4", set()), ("1:5", {"mask"}), ("0:9", {"mask", "frames"})]
 )
 def test_a_damaged_file_counts_only_among_the_selected_frames(tmp_path, frames, codes):
-    """`train` reads no other frames, and accepts what `check` refused."""
     written(tmp_path)
     (tmp_path / "masks/000004.png").write_bytes(b"no mask")
     config = config_from_dict({"sequence": {"frames": frames}}, PAPER)
@@ -252,7 +250,6 @@ def test_the_command_writes_json_and_a_page(sequence, tmp_path, capsys):
 
 
 def test_a_folder_without_a_part_of_a_sequence_is_sent_to_prepare(tmp_path, capsys):
-    """Before, it counted as an EndoNeRF sequence of which every part is missing."""
     clip = tmp_path / "clip"
     clip.mkdir()
     write_video(clip / "a.avi", np.zeros((3, 48, 64, 3), np.uint8))

@@ -140,7 +140,6 @@ def test_black_bars_do_not_make_two_views():
 
 @pytest.mark.parametrize("name", ["a.dcm", "IM0001"])
 def test_a_dicom_file_is_named_as_one(name, tmp_path):
-    """The layouts were listed, and nothing said what the file is or what to do with it."""
     (tmp_path / "study").mkdir()
     for file in (tmp_path / name, tmp_path / "study" / name):
         file.write_bytes(b"\0" * 128 + b"DICM" + b"\0" * 64)
@@ -154,7 +153,6 @@ def test_a_dicom_file_is_named_as_one(name, tmp_path):
                                             ("a.exr", "1 files that end in .exr; convert them to png"),
                                             ("a.zip", "1 archive of the ending .zip; unpack first")])  # fmt: skip
 def test_arrays_and_archives_are_named_as_such(name, said, tmp_path):
-    """A folder of them had the list of layouts alone."""
     (tmp_path / "frames").mkdir()
     (tmp_path / "frames" / name).write_bytes(b"data")
     with pytest.raises(InputError, match=said):

@@ -262,7 +262,6 @@ def test_points_of_nerfstudio_follow_applied_scale(tmp_path):
 
 @pytest.mark.parametrize("excluded", ["white", "black"])
 def test_stated_masks_of_points_have_the_stated_polarity(tmp_path, excluded):
-    """They were read as `mask.png`, whose white is tissue, and --excluded-value was ignored."""
     files(tmp_path, "raw/images", [np.full((48, 64, 3), (150, 60, 60), np.uint8)] * 3)
     poses, K = np.tile(np.eye(4), (3, 1, 1)), np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]])
     points, visible = np.array([[0.0, 0, 5], [1, 0, 6], [0, 1, 7], [1, 1, 5]]), np.ones((4, 3), bool)
@@ -281,7 +280,6 @@ def test_stated_masks_of_points_have_the_stated_polarity(tmp_path, excluded):
 
 
 def test_the_times_of_transforms_give_a_rate(tmp_path):
-    """`--rate` asked for --source-rate, which replaces the times."""
     made.nerfstudio(tmp_path / "raw")
     file = tmp_path / "raw/transforms.json"
     stated = json.loads(file.read_text())

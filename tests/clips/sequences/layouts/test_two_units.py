@@ -24,7 +24,6 @@ def pair(tmp_path):
 
 @pytest.mark.parametrize("stated", ["--baseline", "--calibration"])
 def test_an_arbitrary_unit_of_the_positions_beside_a_baseline_is_refused(tmp_path, pair, stated, capsys):
-    """The baseline was written as a length in the arbitrary unit, and the depth of the pair had another scale."""
     (tmp_path / "a.ini").write_text(ini(), encoding="utf-8")
     words = [*pair, "--baseline", "4", *CAMERA] if stated == "--baseline" else [*pair, stated, str(tmp_path / "a.ini")]
     assert main([*words, "--trajectory-unit", "arbitrary"]) == 2
