@@ -8,11 +8,10 @@ from typing import Any
 import hand_port
 import measure
 import pytest
-from made_up_ports import cases_of
+from searched import SECONDS, search_on
 
-from endotsr.port.judge.npy import write_npy
 from endotsr.port.search import changes, find
-from endotsr.port.search.find import apart, explained, sentences, together
+from endotsr.port.search.find import apart, sentences, together
 
 MISTAKES = {
     "two numbers of a line": (
@@ -143,17 +142,6 @@ FAMILIES = {
         "`np.sort(ratios, axis=None)[(np.size(ratios) - 0) // 2]` where `np.median(ratios)` is right",
     ),
 }  # fmt: skip
-SECONDS = 60.0  # the searches end by themselves before
-
-
-def search_on(golden, folder, stage, *edits):
-    """The search on the answers of the port by hand with some edits."""
-    port = hand_port.operations(edits)
-    for case in cases_of(golden, stage):
-        found = hand_port.answer(port, stage, golden.inputs(case), case.settings)
-        for name in case.outputs:
-            write_npy(folder / case.name / f"{name}.npy", found[name])
-    return explained(golden, folder, "float64", 3, stage, SECONDS)
 
 
 @pytest.mark.parametrize("kind", MISTAKES)
