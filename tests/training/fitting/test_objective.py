@@ -48,15 +48,6 @@ def test_targets_of_terms_that_are_on(frame):
     assert targets.supports is not None
 
 
-def test_targets_of_terms_that_are_off_are_not_made(frame):
-    model = msgspec.structs.replace(PAPER.model, laplacian=False)
-    config = msgspec.structs.replace(with_loss(ssim_weight=0.0, depth_weight=0.0), model=model)
-    targets = frame_targets(frame, config)
-    assert (targets.ssim, targets.depth, targets.supports) == (None, None, None)
-    assert frame_targets(frame, with_loss(depth_weight=0.0)).ssim is not None
-    assert frame_targets(frame, with_loss(ssim_weight=0.0)).depth is not None
-
-
 def parts(rendered, frame):
     """Value and gradients (by colour, by depth) of each term at weight 1, from its own module."""
     return {name: alone(name, rendered, frame) for name in ("l1", *TERMS)}
