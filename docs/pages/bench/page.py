@@ -21,7 +21,7 @@ from endotsr.studies.bench.case import BenchCase, Precision, apart
 from endotsr.studies.bench.stages import Say
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import dated
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 from pages.bench import charts, parts, peers, scaling, start
 from pages.bench import effects as bench_effects
 from pages.store.commands import loaded

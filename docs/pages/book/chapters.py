@@ -16,7 +16,7 @@ import time
 from typing import Any, NamedTuple
 
 from endotsr.errors import InputError
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 from pages.store.commands import loaded
 from pages.store.program import DOCS, Program
 from pages.store.tables import noted, where_and_cores

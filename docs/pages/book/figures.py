@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 from endotsr.untrusted.writing import replace_file
 from pages.book.figure_table import FIGURES, Figure, Formula, Setting
 from pages.store.marks import read_json

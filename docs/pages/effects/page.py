@@ -23,7 +23,7 @@ from endotsr.errors import InputError
 from endotsr.results.report.style import save
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import dated, now
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 from pages.effects import parts as effects_parts
 from pages.effects import study
 from pages.effects import truth as effects_truth

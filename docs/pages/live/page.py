@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 from pages.live.bundle import CHAPTERS, cells, files, formulas
 from pages.live.supply import supply
 from pages.store.commands import loaded

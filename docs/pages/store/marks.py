@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 from endotsr.untrusted.writing import replace_file
 
 

@@ -11,7 +11,7 @@ from endotsr.cli.sweep import ended, run_spec
 from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
 from endotsr.untrusted.json import Keys
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 if TYPE_CHECKING:
     from endotsr.studies.sweeps.ablation_page import AblationRecord

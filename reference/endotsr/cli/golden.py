@@ -10,8 +10,7 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import HELP, parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.untrusted.names import counted
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice, counted
 
 Outdir = Annotated[Path, Option("OUTDIR", positional=True)]
 Level = Literal[0, 1, 2, 3, 4, 5]

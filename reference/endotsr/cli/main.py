@@ -15,8 +15,7 @@ from endotsr.cli.parts.commands import COMMANDS, FORMER
 from endotsr.cli.parts.output import redirected, split_output
 from endotsr.errors import CalibrationError, InputError
 from endotsr.training.runs.stopping import INTERRUPTED, signals_stop
-from endotsr.untrusted.names import plain_line
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice, plain_line
 
 # Read when NumPy is loaded. Several threads call BLAS at the same time, whose calls would wait for one another actively
 # if each had threads of its own; `--threads 1` would not hold either.

@@ -17,8 +17,7 @@ from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.errors import InputError
 from endotsr.training.runs.files import os_error_line
 from endotsr.training.runs.folder import refuse_existing
-from endotsr.untrusted.names import counted
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice, counted
 from endotsr.untrusted.writing import replacing_folder
 
 STILL = named_scene("still")

@@ -3,6 +3,7 @@
 import os
 import re
 import unicodedata
+from collections.abc import Iterable
 
 from endotsr.errors import INVISIBLE, InputError, visible
 
@@ -17,6 +18,12 @@ REFUSED_ON_WINDOWS = '<>:"|?*'
 def counted(count: int, noun: str) -> str:
     """A count with its noun, for a message: `1 frame`, `2 frames`."""
     return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def choice(words: Iterable[str]) -> str:
+    """Alternatives in words: `a`, `a or b`, `one of a, b, c`."""
+    listed = list(words)
+    return " or ".join(listed) if len(listed) < 3 else f"one of {', '.join(listed)}"
 
 
 def file_name(name: object, where: str) -> str:

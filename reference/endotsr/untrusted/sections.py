@@ -16,6 +16,7 @@ import msgspec
 
 from endotsr.errors import InputError
 from endotsr.untrusted.json import Keys
+from endotsr.untrusted.names import choice
 
 SectionType = TypeVar("SectionType", bound=msgspec.Struct)
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -89,12 +90,6 @@ def _explain(message: str, data: dict, kind: Any, prefix: str) -> str:
         kind = {f.name: f.type for f in msgspec.structs.fields(kind)}[name]
         value = value[name]
     return f"{prefix}{found[1]} = {value!r} is not allowed; use {allowed_values(kind)}"
-
-
-def choice(words: Iterable[str]) -> str:
-    """Alternatives in words: `a`, `a or b`, `one of a, b, c`."""
-    listed = list(words)
-    return " or ".join(listed) if len(listed) < 3 else f"one of {', '.join(listed)}"
 
 
 def allowed_values(kind: Any) -> str:

@@ -21,7 +21,7 @@ from endotsr.results.evaluation.baselines import unit_image
 from endotsr.results.evaluation.depth import held_out_depth
 from endotsr.results.evaluation.measures import MEASURES, flicker, measure_lines, measured
 from endotsr.results.evaluation.right_view import FLOW, moved_flow, moved_left, right_view, stereo_baseline
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 LEVEL = np.float32(1 / 255)
 

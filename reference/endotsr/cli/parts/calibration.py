@@ -7,8 +7,7 @@ from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.folder import RunFolder
-from endotsr.untrusted.names import counted
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice, counted
 
 # Settings that affect equation (7).
 REPLACEABLE = (

@@ -20,8 +20,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_text
 from endotsr.untrusted.json import Keys
-from endotsr.untrusted.names import decimal_commas, plain_line
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice, decimal_commas, plain_line
 from endotsr.untrusted.yaml import matrix, read_yaml
 
 HALF_A_PIXEL = "its pixel centres are at integers, as in OpenCV: half a pixel was added to cx and cy"

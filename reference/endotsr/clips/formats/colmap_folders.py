@@ -11,8 +11,7 @@ from endotsr.clips.formats.colmap_model import registered_count
 from endotsr.clips.formats.files import shortened
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.errors import InputError
-from endotsr.untrusted.names import counted, relative_path
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice, counted, relative_path
 
 # Folders with models, or with numbered folders of models; the first that has one counts.
 PLACES = (".", "sparse", "colmap/sparse", "dense", "distorted/sparse")

@@ -16,8 +16,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_bytes, read_text
-from endotsr.untrusted.names import counted
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice, counted
 
 LARGEST_FILE = 1 << 31  # bytes of images.bin: 24 for an observation, enough for more than eighty million
 

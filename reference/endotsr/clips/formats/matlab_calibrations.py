@@ -20,7 +20,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.json import Keys
 from endotsr.untrusted.matlab import read_mat
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 from endotsr.untrusted.yaml import matrix
 
 OF_CALIBRATION = "it documents the calibration"

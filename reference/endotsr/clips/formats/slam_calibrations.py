@@ -17,7 +17,7 @@ from endotsr.clips.formats.calibration_formats import (
 from endotsr.clips.formats.inventory import Inventory
 from endotsr.errors import InputError
 from endotsr.untrusted.json import Keys, number
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 from endotsr.untrusted.yaml import matrix
 
 ORB = Inventory(

@@ -22,8 +22,7 @@ from endotsr.clips.formats.video_marks import container_notes
 from endotsr.clips.formats.view_marks import ViewMarks, view_marks
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS, open_regular
-from endotsr.untrusted.names import plain_line
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice, plain_line
 
 LARGEST_FILE = 1 << 40  # bytes; a video is decoded picture by picture
 # First bytes of the containers. The extension is not sufficient: a decoder would follow a play list.

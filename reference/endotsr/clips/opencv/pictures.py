@@ -23,9 +23,8 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array
 from endotsr.untrusted.files import MOST_PIXELS, read_bytes
 from endotsr.untrusted.first_bytes import FIRST_BYTES, true_name
-from endotsr.untrusted.names import counted, plain_line
+from endotsr.untrusted.names import choice, counted, plain_line
 from endotsr.untrusted.png import LARGEST_FILE
-from endotsr.untrusted.sections import choice
 
 JPEG_ENDINGS = (".jpg", ".jpeg")
 TIFF_ENDINGS = (".tif", ".tiff")

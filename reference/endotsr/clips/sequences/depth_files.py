@@ -15,7 +15,7 @@ from endotsr.clips.sequences.clip import grey_plane
 from endotsr.clips.sequences.sampling import sparse_step
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 CLIPPED = SequenceConfig().depth_percentiles  # depth is clipped to these before resizing
 ANOTHER_SCALE = 64.0  # times the usual median depth; 8 bits stretched to 16 give 256

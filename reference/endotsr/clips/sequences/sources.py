@@ -30,7 +30,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.json import read_json, text
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 PROPOSAL, MASKS = "proposal.json", "masks"  # next to a folder of masks that a program proposed; that folder
 MASK_ENDINGS = (*PICTURE_ENDINGS, *ARRAY_ENDINGS)

@@ -8,7 +8,7 @@ import msgspec
 
 from endotsr.clips.simulator.settings import EFFECTS, SimulatorSettings, with_effects
 from endotsr.errors import InputError
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 SIZE = SimulatorSettings(width=640, height=512, frames=63)
 IN_FILES = ("stereo", "depth_rounding")  # on in every scene: required by a sequence folder

@@ -11,7 +11,8 @@ import msgspec
 from endotsr.clips.simulator import sections
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS
-from endotsr.untrusted.sections import Count, NonNegative, Positive, Section, choice
+from endotsr.untrusted.names import choice
+from endotsr.untrusted.sections import Count, NonNegative, Positive, Section
 
 Side = Annotated[int, msgspec.Meta(ge=16)]
 FrameCount = Annotated[int, msgspec.Meta(ge=3)]

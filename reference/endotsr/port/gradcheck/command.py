@@ -5,7 +5,7 @@ from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.training.runs.files import refuse_unwritable
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 
 def run_gradcheck(

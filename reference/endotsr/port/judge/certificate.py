@@ -21,7 +21,7 @@ from endotsr.port.judge.format import MOST_RUNS, Level, Precision, _Strict, read
 from endotsr.port.judge.profiles import PROFILES, WITHOUT, ProfileClaim, claim_text
 from endotsr.port.judge.records import Report
 from endotsr.port.judge.store import Golden
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 from endotsr.untrusted.writing import replace_text
 
 LONGEST = 500  # characters of a text

@@ -12,7 +12,7 @@ import msgspec
 from endotsr.errors import InputError
 from endotsr.port.judge.format import LEVELS, Case
 from endotsr.port.judge.store import Golden
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 REVERSE = "d_"  # the names of the outputs of a reverse pass begin with it
 WITHOUT = ", without "  # before what a claim leaves out

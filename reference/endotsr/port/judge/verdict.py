@@ -24,7 +24,7 @@ from endotsr.port.judge.recognise import merged, pair_of, suspects_of
 from endotsr.port.judge.records import CaseReport, Report
 from endotsr.port.judge.second_run import not_repeated, repeated
 from endotsr.port.judge.store import Golden
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations omitted by the port, one per line
 INSIDE = "inside"  # in that file: the port cannot write arrays inside its operations

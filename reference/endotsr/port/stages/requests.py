@@ -19,7 +19,7 @@ from endotsr.method.splatting.settings import LegacyDeviations, RasterSettings
 from endotsr.port.stages.stage import Inputs, Settings
 from endotsr.training.fitting.model import Spectral, spectral_from
 from endotsr.training.scene.gaussians import Gaussians
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 COMPOSITORS: tuple[Compositor, ...] = ("definition", "blocks")
 

@@ -34,7 +34,7 @@ from endotsr.results.evaluation.records import Measured, MeasureRow
 from endotsr.results.evaluation.right_view import right_view
 from endotsr.training.fitting.model import render_at, with_corrected_cameras
 from endotsr.training.runs.model import Model
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 STATIC = 0.5  # px between successive frames: largest median flow of a static pixel
 STATIC_HIGH = 1.0  # px: largest 90th percentile of the flow

@@ -23,7 +23,7 @@ from endotsr.training.fitting.model import corrected_cameras, render_at, scene_a
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.training.runs.model import Model, load_model
 from endotsr.training.scene.gaussians import Gaussians
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 FOCAL = 1.2  # focal length of the facing camera, picture widths
 MARGIN = 1.1  # width of its picture relative to the extent of the Gaussians

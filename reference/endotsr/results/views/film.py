@@ -15,7 +15,7 @@ from endotsr.clips.sequences.record import UNKNOWN_RATE
 from endotsr.errors import InputError
 from endotsr.results.report.figures import ByteImage
 from endotsr.untrusted.marks import FILM
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 from endotsr.untrusted.writing import replace_file
 
 KINDS = (".mp4", ".webm", ".gif")

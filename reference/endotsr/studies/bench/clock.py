@@ -15,7 +15,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from endotsr.studies.bench.records import Spread
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 REST = "rest"
 SPLAT = ("projection", "binning", "blend forward", "blend reverse")

@@ -27,7 +27,8 @@ from endotsr.errors import InputError
 from endotsr.results.evaluation.measures import check_measures
 from endotsr.training.runs.sources import SIMULATED
 from endotsr.untrusted.json import Keys, Text, integer
-from endotsr.untrusted.sections import Section, checked, choice, refuse_unknown_keys
+from endotsr.untrusted.names import choice
+from endotsr.untrusted.sections import Section, checked, refuse_unknown_keys
 from endotsr.untrusted.toml import by_key, read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9+_. -]{0,60}")

@@ -13,8 +13,7 @@ from endotsr.errors import InputError
 from endotsr.untrusted import json as json_files
 from endotsr.untrusted.json import Keys
 from endotsr.untrusted.marks import refuse_foreign
-from endotsr.untrusted.names import plain_line
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice, plain_line
 from endotsr.untrusted.writing import replace_text
 
 OF_A_RUN = frozenset(

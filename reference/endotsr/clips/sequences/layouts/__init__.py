@@ -25,7 +25,7 @@ from endotsr.clips.sequences.unknown_source import not_there, what_it_is
 from endotsr.clips.sequences.unread import folders_of, together, unread
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice
 
 # Statements of a user that only some layouts read; the other options depend on these.
 STATEMENTS = (

@@ -39,8 +39,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.json import Keys, integer, listed, number, read_json
-from endotsr.untrusted.names import counted, relative_path, shown
-from endotsr.untrusted.sections import choice
+from endotsr.untrusted.names import choice, counted, relative_path, shown
 from endotsr.untrusted.yaml import matrix
 
 FILES = ("transforms.json", "transforms_train.json")
