@@ -7,24 +7,17 @@ import numpy as np
 from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.poses import rows_from_cameras
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.errors import InputError
 
 
 def write_endonerf(sequence: Sequence, folder: Path) -> None:
     """Write a sequence in this layout: images, depth as 16-bit whole millimetres, masks with white = excluded, poses.
 
     Depth is rounded, to no less than 1 where there is depth. Names become 000000.png, 000001.png, ...
-    Raises:  InputError if the folder already holds images, a depth exceeds 65535, or a camera does not fit the format.
+    Raises:  InputError if a camera does not fit the format.
     """
-    folder = Path(folder)
-    if (folder / "images").exists():
-        raise InputError(f"{folder}: already holds a sequence (images/)")
-    if sequence.depth.max() > 65535:
-        frame = int(sequence.depth.reshape(sequence.count, -1).max(axis=1).argmax())
-        raise InputError(f"{folder}: frame {frame}: depth {sequence.depth.max():g} does not fit into 16 bits")
     rows = rows_from_cameras(sequence.cameras, sequence.depth.reshape(sequence.count, -1).max(axis=1))
     for name in ("images", "masks", "depth"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
+        (folder / name).mkdir(parents=True)
     np.save(folder / "poses_bounds.npy", rows)
     for i in range(sequence.count):
         depth = sequence.depth[i]
