@@ -278,7 +278,7 @@ def test_rendering_at_any_time_and_camera(sequence, run):
         ({"time": float("nan")}, "a number in"),
         ({"time": 0.5, "camera": 9}, "a frame from 0 to 8"),
         ({"time": 0.5, "camera": -1}, "a frame from 0 to 8"),
-        ({"time": 0.5, "without": ("laplacian",)}, "appearance, spectral_motion"),
+        ({"time": 0.5, "without": ("laplacian",)}, "appearance or spectral_motion"),
     ],
 )
 def test_views_that_do_not_exist(run, given, named):
