@@ -1,5 +1,6 @@
 """The page of claims: what it says is what the results say, and a verdict needs numbers."""
 
+import functools
 import json
 import re
 from itertools import pairwise
@@ -25,6 +26,12 @@ from endotsr.studies.sweeps.ablation_page import UNRECORDED, ablation_record
 
 PAGE, GUIDE, *_ = claims.PROGRAM.pages
 MEASURED = [name for name, file in claims.FILES.items() if (claims.RESULTS / file).exists()]
+
+
+@functools.cache
+def parts() -> dict[str, str]:
+    """The generated parts of the page, made once."""
+    return claims.parts()
 
 
 def stored(name: str) -> dict:
@@ -167,15 +174,8 @@ def test_the_largest_step_is_ahead_of_each_other():
 
 def made_up_record(gain: float) -> dict:
     """An ablation of two configurations and three seeds."""
-    rows = []
-    for seed in range(3):
-        for name, psnr in (("S", 38.0 + seed), ("A+S", 38.0 + seed + gain + 0.01 * seed)):
-            rows.append({
-                "name": f"{name}{seed}", "sequence": "pulling", "split": "every_eighth", "configuration": name,
-                "seed": seed, "status": "finished", "psnr_full": psnr, "psnr_tissue": psnr - 1.8, "ssim_full": 0.96,
-                "iterations": 6000, "preset": "paper", "gaussians": 60000,
-                "arrays_sha256": {"images": "a"}, "seconds": 600.0, "threads": 1,
-            })  # fmt: skip
+    steps = (("S", 0.0, 0.0), ("A+S", gain, 0.01))
+    rows = [finished(name, k, "pulling", 38.0 + k + more + k * noise) for k in range(3) for name, more, noise in steps]
     return json.loads(json.dumps(ablation_record(rows, ["endotsr", "ablate"])))
 
 
@@ -227,7 +227,7 @@ def test_what_the_page_says_of_the_right_camera():
     half = stored("pulling_pairs")
     gains = next(r for r in half["increments"] if r["metric"] == "psnr_full")["of"]
     assert all(pair["difference"] > 0 for pair in gains)
-    row = row_of(claims.parts()["ours"], "The view of the right eye, at held-out")
+    row = row_of(parts()["ours"], "The view of the right eye, at held-out")
     assert "not decided" in row and row.endswith("| 0.29 dB |")
     base, whole, moved = map(float, re.findall(r"([\d.]+) dB", right_eye(half)))
     assert moved > max(base, whole)
@@ -258,7 +258,7 @@ def test_a_claim_is_about_the_pair_of_the_paper(words, with_, without):
     record = stored("pulling")
     difference = psnr(record, with_) - psnr(record, without)
     low, high = stats.ttest_1samp(difference, 0.0).confidence_interval(0.95)
-    row = cells(claims.parts()["verdicts_pulling"], words)
+    row = cells(parts()["verdicts_pulling"], words)
     assert row["compared"] == f"{with_} - {without}" and row["better in"] == f"{(difference > 0).sum()} of 3"
     assert row["mean (median)"] == f"{difference.mean():+.3f} dB ({np.median(difference):+.3f})"
     assert row["paired interval"] == f"{low:+.3f} to {high:+.3f} dB"
@@ -325,7 +325,7 @@ def test_published_steps_are_the_differences_of_the_published_means():
 def test_the_answer_says_what_the_records_say():
     """Its numbers, computed here once more; a clip that is not measured is named."""
     record = stored("pulling")
-    text = claims.parts()["answer"]
+    text = parts()["answer"]
     whole, step = psnr(record, "A+S+L") - psnr(record, "base"), psnr(record, "A+S") - psnr(record, "S")
     assert f"by {whole.mean():+.2f} dB on pulling (95 % interval over the seeds " in text
     low, high = stats.ttest_1samp(whole, 0.0).confidence_interval(0.95)
@@ -354,7 +354,7 @@ def test_the_answer_says_what_excluded_pixels_add():
     added = [np.subtract(of[name]["psnr_full"], of[name]["psnr_tissue"]) for name in of]
     assert all(row == pytest.approx(added[0], abs=1e-5) for row in added)
     said = black(claims.RESULTS)
-    assert f"which adds {added[0].mean():.2f} dB, and" in said and said in claims.parts()["answer"]
+    assert f"which adds {added[0].mean():.2f} dB, and" in said and said in parts()["answer"]
     assert f"{100 * np.mean(1 - 10 ** (-added[0] / 10)):.1f} % of the pixels of pulling" in said
 
 
@@ -363,7 +363,7 @@ def test_the_answer_states_no_order_within_the_interval_of_the_level():
     assert against(39.05, 39.0, 0.0) == "above"
     mean, limits = student([*psnr(stored("pulling"), "A+S+L")])
     blend = baselines(claims.RESULTS, "pulling")["two_neighbours_tissue"]
-    text = claims.parts()["answer"]
+    text = parts()["answer"]
     assert f"{against(mean, blend, limits[1] - mean)} the tissue-only blend" in text and f"| {blend:.2f} |" in text
 
 
@@ -381,7 +381,7 @@ def test_what_the_page_says_of_the_largest_step():
 
 
 def test_runs_without_hashes_are_labelled_in_their_tables():
-    made = claims.parts()
+    made = parts()
     for name in MEASURED:
         recorded = all(row.get("arrays_sha256") for row in stored(name)["rows"])
         assert (UNRECORDED in made[name]) == (not recorded)
@@ -418,7 +418,7 @@ def test_steps_are_compared_by_paired_tests_of_the_steps():
     for ahead in ((a - s) - (s - base), (a - s) - (whole - a)):
         low, high = stats.ttest_1samp(ahead, 0.0).confidence_interval(0.95)
         shown.append(f"{low:+.3f} to {high:+.3f} dB")
-    row = cells(claims.parts()["verdicts_pulling"], "Temporal appearance is the largest of the three steps: PSNR")
+    row = cells(parts()["verdicts_pulling"], "Temporal appearance is the largest of the three steps: PSNR")
     assert row["paired interval"] == "; ".join(shown) and row["verdict"] == "not decided: an interval contains 0"
     assert {c.with_: c.without for c in COMPARISONS[:3]} == {"S": "base", "A+S": "S", "A+S+L": "A+S"}
 
@@ -439,7 +439,7 @@ def test_differences_on_tissue_are_those_of_the_whole_image(name):
 
 
 def test_lpips_has_a_verdict_for_each_range_of_its_input():
-    table = claims.parts()["verdicts_pulling"]
+    table = parts()["verdicts_pulling"]
     rows = [cells(table, f"Level: LPIPS, input in {where}") for where in ("[0, 1]", "[-1, 1]")]
     level = next(level for level in stored("pulling")["levels"] if level["configuration"] == "A+S+L")
     shown = [f"{level['lpips']:.4f}", f"{level['lpips_symmetric']:.4f}"]
@@ -454,7 +454,7 @@ def test_the_rules_stand_before_the_numbers():
 
 def test_what_the_paper_does_not_contain_stands_apart():
     """No row of ours among the verdicts, none of the paper among ours, and nothing is "not at hand"."""
-    made = claims.parts()
+    made = parts()
     for words in ("right eye", "Every second", "Blocks of", "end of the clip", "cross-fade", "free number"):
         assert words not in made["verdicts_pulling"] and words in made["ours"]
     assert "published" not in made["ours"] and "not at hand" not in PAGE.read_text(encoding="utf-8")
@@ -466,7 +466,7 @@ def test_what_the_paper_does_not_contain_stands_apart():
 
 def test_the_visits_are_those_of_the_splits():
     """Frames 1, 3, ... of 63 leave 32; blocks of two in periods of 24 leave 57; the last eight and every eighth 55."""
-    text = claims.parts()["visits"]
+    text = parts()["visits"]
     for count, frames in ((55, 32), (31, 57), (32, 55)):
         assert f"{count} visits to each of {frames} frames" in text and count == round(1750 / frames)
     assert "makes 109 visits" in text and round(6000 / 55) == 109
