@@ -68,7 +68,7 @@ def test_an_instrument_that_covers_the_view_is_not_blurred():
 @pytest.mark.data
 @pytest.mark.parametrize("name", ["endonerf_pulling", "endonerf_cutting", "sinus_endoscopy"])
 def test_recorded_clips_have_no_such_frame_and_have_one_if_it_is_blurred(name):
-    files = sorted((data_folder(name) / "images").iterdir())[:40]
+    files = sorted((data_folder(name) / "images").iterdir())[:24]
     pictures = [read_picture(file) for file in files]
     for facts in (facts_of(pictures), facts_of([picture[256:512, 320:640] for picture in pictures])):
         assert [named([], facts[::every]) for every in (1, 2, 3)] == [[], [], []]

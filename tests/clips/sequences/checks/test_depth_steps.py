@@ -9,12 +9,12 @@ import pytest
 from scipy.ndimage import zoom
 
 from data_folder import data_folder
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.checks.depth_steps import DepthStep, DepthSteps, loaded_steps, scale_finding
-from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
 from endotsr.clips.simulator.simulate import simulate
-from endotsr.config import SequenceConfig, with_settings
+from endotsr.config import with_settings
 
 SIZE = {"width": 160, "height": 128, "frames": 16}
 
@@ -30,6 +30,13 @@ def scene(name):
     return simulate(msgspec.structs.replace(named_scene(name), **SIZE)).sequence
 
 
+@cache
+def coming_near():
+    settings = with_effects(SimulatorSettings(**{**SIZE, "frames": 48}), "camera_motion", "noise")
+    path = {"path": "hand", "amplitude": 25.0, "cycles": 4.0}
+    return simulate(with_settings(settings, camera_motion=path)).sequence
+
+
 def codes(sequence) -> list[str]:
     return [found.code for found in loaded_steps(sequence).findings("depth")]
 
@@ -43,10 +50,7 @@ def test_a_scene_that_moves_has_one_scale(name):
 @pytest.mark.parametrize("stride", [1, 2, 4])
 def test_a_scope_that_comes_much_nearer_between_two_pictures_has_one_scale(stride):
     """Its flow is wrong at this size: a single step is unexplained by more than the limit."""
-    settings = with_effects(SimulatorSettings(**{**SIZE, "frames": 48}), "camera_motion", "noise")
-    path = {"path": "hand", "amplitude": 25.0, "cycles": 4.0}
-    sequence = simulate(with_settings(settings, camera_motion=path)).sequence
-    steps = DepthSteps(48 // stride)
+    sequence, steps = coming_near(), DepthSteps(48 // stride)
     for k, i in enumerate(range(0, 48, stride)):
         steps.add(k, sequence.picture(i), sequence.depth[i], sequence.masks[i])
     assert steps.findings("depth") == [] and (stride < 4 or steps.jumps)
@@ -120,9 +124,17 @@ def test_steps_are_between_neighbours_and_at_most_48():
 @pytest.mark.data
 @pytest.mark.parametrize("name", ["endonerf_pulling", "endonerf_cutting"])
 def test_recorded_depth_has_one_scale(name):
-    sequence = read_sequence(data_folder(name), SequenceConfig(frames="0:32", scale=0.5))
-    assert codes(sequence) == []
-    assert codes(scaled(sequence, 0.05)) == ["depth-own-scale"]
-    depth = sequence.depth.copy()
-    depth[17:] *= 1.2
-    assert codes(replace(sequence, depth=depth)) == ["depth-scale-jump"]
+    pictures, masks, depth = (
+        [read_png(file)[::2, ::2] for file in sorted((data_folder(name) / part).iterdir())[:32]]
+        for part in ("images", "masks", "depth")
+    )
+
+    def said(factors):
+        steps = DepthSteps(32)
+        for i, factor in enumerate(factors):
+            steps.add(i, pictures[i], (factor * depth[i]).astype(np.float32), masks[i] < 128)
+        return [found.code for found in steps.findings("depth")]
+
+    assert said(np.ones(32)) == []
+    assert said(np.exp(np.random.default_rng(0).normal(0, 0.05, 32))) == ["depth-own-scale"]
+    assert said(np.where(np.arange(32) < 17, 1, 1.2)) == ["depth-scale-jump"]
