@@ -132,7 +132,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "sharp.bridged": Setting("endotsr.config:SHARP.training.bridge_fraction", scale=100),
     "rate.motion": Setting("endotsr.config:PAPER.optimiser.spectral_motion_factor", scale=100),
     "scale.memory": Setting("pages.bench.scale:MEMORY"),
-    "speed.pixels": Setting("endotsr.training.runs.speed:LEAST_PIXELS", "{:,}"),
+    "speed.pixels": Setting("endotsr.training.runs.speed:LEAST_PIXELS", "{:.0f}"),
     "duration.assumed": Setting("endotsr.clips.sequences.forecast.seconds:SECONDS", "{:.3f}"),
     "claims.hundredth": Setting("pages.claims.rules:HUNDREDTH", "{:.2f}"),
     "claims.power": Setting("pages.claims.power:POWER", scale=100),
