@@ -38,7 +38,7 @@ PAPER = "pulling_paper_seed?.json"
 ALONE = "clips.endonerf_pulling.every eighth frame.baselines"
 CUTTING = "clips.endonerf_cutting.every eighth frame.baselines"
 BLOCKS8, BLOCKS16 = "clips.endonerf_pulling.blocks of 8 frames.baselines", "pulling_sharp_blocks16.json"
-CLAMPED, LATER = "tradeoff_cutting_sharp.json", "preset=sharp&register_bytes=64&passes=1"
+CLAMPED = "tradeoff_cutting_sharp.json"
 TRUTH, PULL = "effects_truth.json", "scenes.pull and breath"
 VIEWS, WITHOUT, OF_SHARP = "sweeps/other_views.json", "other_views.json", "rows.*configuration=sharp.measures"
 MODEL, MOVED = "rows.label=this model", "rows.label=left picture moved by the prior depth"
@@ -90,8 +90,6 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "right.flow": Figure(WITHOUT, f"measures.right_view.{FLOW}.held_out_psnr", "{:.2f}"),
     "right.depth": Figure(VIEWS, f"{OF_SHARP}.depth.{MODEL}.mean_absolute", "{:.2f}"),
     "right.depth.blend": Figure(WITHOUT, f"measures.depth.{BLEND}.mean_absolute", "{:.2f}"),
-    "waiting.pulling": Figure("waiting.json", f"rows.clip=endonerf_pulling&{LATER}.held_out.psnr_tissue", "{:.2f}"),
-    "waiting.cutting": Figure("waiting.json", f"rows.clip=endonerf_cutting&{LATER}.held_out.psnr_tissue", "{:.2f}"),
     "truth.paper.light": Figure(TRUTH, "scenes.light.`paper`.*.depth_mm", "{:.3f}"),
     "truth.still.light": Figure(TRUTH, "scenes.light.`paper` without S.*.depth_mm", "{:.3f}"),
     "sharp.blocks16": Figure(BLOCKS16, "held_out.mean.psnr_tissue", "{:.2f}"),

@@ -28,7 +28,7 @@ MEASURED: Columns = (
     ("PSNR full, dB", "psnr_full", 1.0, 2),
     ("LPIPS [0,1]", "lpips", 1.0, 4),
 )  # head, key, unit, digits
-OF_RUN = ("seconds", "threads", "peak_memory_bytes", "gaussians")
+OF_RUN = ("peak_memory_bytes", "gaussians")
 SIZES: Columns = (("GB", "peak_memory_bytes", 1e9, 1), ("Gaussians", "gaussians", 1.0, 0))
 
 
@@ -110,21 +110,14 @@ def cutting() -> str:
         row for row in loaded(RESULTS / "ablation_cutting.json")["rows"] if row["configuration"] == "A+S+L"
     ]
     columns = (*SIZES, *MEASURED)
-    cells = [
-        [f"`{name}`", f"{mean(row['seconds'] for row in of) / 60:.0f}", str(of[0]["threads"]), *values(of, columns),
-         str(len(of))]
-        for name, of in rows.items()
-    ]  # fmt: skip
+    cells = [[f"`{name}`", *values(of, columns), str(len(of))] for name, of in rows.items()]
     first = runs["quick"][0]
     for key in (*PREDICTIONS[1:], *TISSUE_ONLY):
-        cells.append([LABELS[key], "-", "-", *values([first["baselines"][key]["mean"]], columns), "-"])
+        cells.append([LABELS[key], *values([first["baselines"][key]["mean"]], columns), "-"])
     source = first["run"]["input"]
     size = f"{source['width']}x{source['height']}"
-    about = (
-        f"{source['source']}, {source['frames']} frames of {size}, every eighth held out. "
-        "The minutes are of machines that did other work."
-    )
-    return noted(("Preset", "Minutes", "Threads", *(head for head, *_ in columns), "Seeds"), cells, about)
+    about = f"{source['source']}, {source['frames']} frames of {size}, every eighth held out."
+    return noted(("Preset", *(head for head, *_ in columns), "Seeds"), cells, about)
 
 
 def simulated() -> str:

@@ -1,15 +1,15 @@
 """`sharp` on EndoNeRF cutting with the outliers of its prior depth kept and removed: a table of the rulings.
 
 In: docs/results/outliers_kept_seed?.json, recorded at revision 21e07a9c, whose `sharp` kept them (today
-`--sequence.depth-outliers kept`), and docs/results/cutting_sharp_seed?.json. The two frames named are the held-out
-neighbours of the training frames with outliers, 74 and 146.
+`--sequence.depth-outliers kept`), and docs/results/outliers_removed_seed?.json, recorded at b6d47884. The two frames
+named are the held-out neighbours of the training frames with outliers, 74 and 146.
 """
 
 from endotsr.results.report.tables import markdown
 from pages.store.commands import loaded
 from pages.store.program import RESULTS, Program
 
-RULES = {"kept": "outliers_kept_seed?.json", "removed": "cutting_sharp_seed?.json"}
+RULES = {"kept": "outliers_kept_seed?.json", "removed": "outliers_removed_seed?.json"}
 BESIDE = (73, 145)
 HEAD = ("outliers", "seed", "PSNR, dB", "LPIPS [0,1]", *(f"frame {frame}, dB" for frame in BESIDE))
 
