@@ -154,7 +154,7 @@ def test_files_are_refused_before_the_work(name, finished_run, tmp_path, capsys)
 @pytest.mark.parametrize("option, name", [("--json", "found.html"), ("--html", "page.pdf"), ("--html", "page.JSON")])
 def test_a_file_with_the_ending_of_another_kind_is_refused(option, name, tmp_path, capsys):
     words = ["check", "simulated", option, str(tmp_path / name)]
-    assert_refused(capsys, words, option, name, f"use one of .{option[2:]}")
+    assert_refused(capsys, words, option, name, f"use .{option[2:]}")
     assert list(tmp_path.iterdir()) == []
 
 

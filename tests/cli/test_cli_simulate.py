@@ -68,7 +68,7 @@ def test_a_list_of_effects_is_a_scene_too(tmp_path):
         (["pulling", "--pull.stop", "0.1"], ("pull.stop = 0.1 is not allowed", "above pull.start = 0.15")),
         (["smoke", "--smoke.start", "0.9", "--smoke.stop", "0.9"], ("smoke.stop = 0.9", "above smoke.start = 0.9")),
         (["still", "--noise.on", "perhaps"], ("perhaps",)),
-        (["still", "--noise.of", "1"], ("unknown key noise.of", "on, sigma")),
+        (["still", "--noise.of", "1"], ("unknown key noise.of", "use on or sigma")),
         (["still", "--motion-blur.shutter", "0.9"], ("--motion-blur.shutter has no effect", "add --motion-blur.on")),
         (["pulling", "--pull.no-on", "--pull.width", "9"], ("--pull.width has no effect: pull is off",)),
         (["still", "--block-length", "2"], ("block_length = 2 does not fit files", "train --sequence.split blocks")),

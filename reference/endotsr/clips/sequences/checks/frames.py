@@ -142,10 +142,10 @@ def _blue_finding(facts: list[FrameFacts], where: str) -> list[Finding]:
     red, green, blue = np.median(means, axis=0).tolist()
     if blue - red < BLUE:
         return []
-    negative = green - red > blue - green
-    what = f"blue is {blue - red:.0f}" + (f" and green {green - red:.0f}" if negative else "")
-    code = "negative-pictures" if negative else "blue-pictures"
-    return [finding(code, where, f"{what} grey levels above red on average")]
+    above = "grey levels above red on average"
+    if green - red > blue - green:
+        return [finding("negative-pictures", where, f"blue is {blue - red:.0f} and green {green - red:.0f} {above}")]
+    return [finding("blue-pictures", where, f"blue is {blue - red:.0f} {above}")]
 
 
 def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding]:
