@@ -94,9 +94,7 @@ def test_the_line_on_minutes_is_of_this_clip_and_of_the_points_that_it_starts_wi
     """
     clip = simulate(SimulatorSettings(frames=11, width=64, height=side)).sequence
     monkeypatch.setattr("endotsr.method.kernels.vectors.REGISTER", 64)  # bytes, of a processor with AVX-512
-    monkeypatch.setattr("endotsr.training.fitting.compile_ahead.compile_ahead", lambda *_: False)
-    monkeypatch.setattr(pace, "seconds_of_unit", lambda *_: 0.1)
-    config, line = config_of_minutes(SimpleNamespace(minutes=0.13), clip, SHARP, 1)
+    config, line = config_of_minutes(0.13, clip, SHARP, 0.1, 1)
     asked, most = config.initialisation, config.density.maximum
     points = min(asked.first_frame_points, 64 * side) + asked.other_frame_points
     assert (most < points) == (side == 96) and line.endswith(f" iterations, {max(most, points)} Gaussians")

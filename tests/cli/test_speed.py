@@ -1,12 +1,13 @@
 """The speed of the machine between trainings: kept only if enough was timed, and never in the way."""
 
 import pytest
-from tiny import train_words, written_folder
+from tiny import scene, train_words, written_folder
 
 from endotsr.cli.main import main
 from endotsr.cli.parts import waiting
 from endotsr.clips.sequences.forecast.seconds import Beside, assumed_unit
-from endotsr.training.runs import pace, speed
+from endotsr.errors import InputError
+from endotsr.training.runs import pace, speed, training
 
 
 @pytest.fixture
@@ -80,3 +81,19 @@ def test_check_says_that_its_minutes_assume_a_speed(kept, tmp_path, capsys):
     speed.remember_unit(2, 0.1, 900, 90_000)
     main(words)
     assert "training needs about" in (said := capsys.readouterr().out) and "assumed" not in said
+
+
+def test_a_training_of_given_minutes_times_its_iterations_once(tmp_path, capsys, monkeypatch):
+    """It ends before the training."""
+
+    def ended(*_):
+        raise InputError("ended")
+
+    monkeypatch.setattr(speed, "LEAST_PIXELS", 1)
+    monkeypatch.setattr(speed, "speed_file", lambda threads: tmp_path / "speed.json")
+    monkeypatch.setattr(training, "train_new_run", ended)
+    timed = []
+    monkeypatch.setattr(pace, "seconds_of_unit", lambda sequence, config: timed.append(config) or 0.1)
+    assert main(["train", scene(), "--out", str(tmp_path / "run"), "--no-evaluate", "--minutes", "9"]) == 2
+    said = capsys.readouterr()
+    assert "minutes: 9" in said.out and speed.TIMED in said.out and "ended" in said.err and len(timed) == 1

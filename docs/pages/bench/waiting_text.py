@@ -65,9 +65,11 @@ def about(rows: list[dict[str, Any]]) -> str:
         " A *former* evaluation is of a command before the evaluation and the initial motion were changed."
     ) * any("blas_threads" not in row for row in rows)
     speeds = {row["said"]["start"]["speed"] for row in rows}
-    former += (" A speed that was *assumed* was the same for every machine; a few iterations are *timed* now.") * (
-        "assumed" in speeds
-    )
+    if "assumed" in speeds:
+        former += (
+            " A speed that was *assumed* was the same for every machine with vectors of this length; a few iterations"
+            " are *timed* now."
+        )
     return (
         f"Frames of {' and '.join(sizes)}, every eighth held out; {' and '.join(clocks)}; {', '.join(machines)}; "
         f"{max(row['date'] for row in rows)}. The forecast was printed after {after} iterations. The largest rise is "

@@ -176,26 +176,20 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     from endotsr.clips.simulator.recorded import recorded_positions
     from endotsr.clips.simulator.settings import SimulatorSettings
     from endotsr.method.kernels.threads import use_threads
-    from endotsr.training.runs.files import refuse_inside
     from endotsr.training.runs.sources import SIMULATED, load_sequence, start_record
     from endotsr.training.runs.training import train_new_run
 
-    if not options.sequence:
-        raise InputError("train: SEQUENCE is missing: a sequence folder, or the word `simulated`")
+    _refuse_before_reading(options)
     assert options.out is not None
-    if options.minutes is not None and not 0 < options.minutes < math.inf:
-        raise InputError(f"train: --minutes {options.minutes:g}: use a number > 0")
     config, source = options.settings, options.sequence
-    refuse_existing(options.out)
-    if source != SIMULATED:
-        refuse_inside(options.out, Path(source), "the sequence")
     sequence = load_sequence(source, config, SimulatorSettings())
     if options.evaluate and source != SIMULATED:
         recorded_positions(Path(source), sequence)  # raises for a damaged truth before the training
     threads = use_threads(config.training.threads)
     config, schedule_note = of_length(config, len(sequence.train_index), schedule_note)
-    if options.minutes is not None:
-        config, schedule_note = config_of_minutes(options, sequence, config, threads)
+    unit = None if options.minutes is None else _timed_unit(sequence, config)
+    if options.minutes is not None and unit is not None:
+        config, schedule_note = config_of_minutes(options.minutes, sequence, config, unit, threads)
     found: RunRecord = {}
     lines = ["effects: everything; `--effects auto` trains only the components that the clip needs"]
     if options.effects == "auto":
@@ -205,7 +199,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     _print_sequence(source, sequence)
     for line in lines:
         print(line)
-    shown = _progress(RunFolder(options.out), source, sequence, config, options)
+    shown = _progress(RunFolder(options.out), source, sequence, config, options, unit=unit)
     record = start_record(["endotsr", "train", *words], source, sequence, config, SimulatorSettings(), threads)
     again = shlex.join(_evaluation_words(options))
     folder = train_new_run(options.out, {**record, **found}, sequence, config, shown, again)
@@ -213,26 +207,46 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     return folder, sequence, shown
 
 
-def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Config, threads: int) -> tuple[Config, str]:
-    """The settings for the requested minutes, from a few timed iterations, and a line on them."""
+def _refuse_before_reading(options: TrainOptions) -> None:
+    """Raise InputError for options with which no new training can begin."""
+    from endotsr.training.runs.files import refuse_inside
+    from endotsr.training.runs.sources import SIMULATED
+
+    if not options.sequence:
+        raise InputError("train: SEQUENCE is missing: a sequence folder, or the word `simulated`")
+    assert options.out is not None
+    if options.minutes is not None and not 0 < options.minutes < math.inf:
+        raise InputError(f"train: --minutes {options.minutes:g}: use a number > 0")
+    refuse_existing(options.out)
+    if options.sequence != SIMULATED:
+        refuse_inside(options.out, Path(options.sequence), "the sequence")
+
+
+def config_of_minutes(
+    minutes: float, sequence: "Sequence", config: Config, unit: float, threads: int
+) -> tuple[Config, str]:
+    """The settings for the requested minutes, and a line on them; unit: seconds per unit of work with these threads."""
     from endotsr.clips.sequences.forecast.seconds import vector_factor
     from endotsr.clips.sequences.forecast.work import GAUSSIANS, at_start, iteration_work
     from endotsr.training.runs.pace import paced_for
 
-    assert options.minutes is not None
-    unit = _timed_unit(sequence, config)
-    found = paced_for(options.minutes, sequence, config, unit, threads)
+    found = paced_for(minutes, sequence, config, unit, threads)
     pixels = sequence.width * sequence.height
     late = unit * float(iteration_work(GAUSSIANS, pixels, 1.0, vector_factor()))
     gaussians = max(found.density.maximum, at_start(found, pixels).gaussians)
     return found, (
-        f"minutes: {options.minutes:g}; an iteration of 60 000 Gaussians takes {1e3 * late:.0f} ms: "
+        f"minutes: {minutes:g}; an iteration of 60 000 Gaussians takes {1e3 * late:.0f} ms: "
         f"{found.training.iterations} iterations, {gaussians} Gaussians"
     )
 
 
-def _timed_unit(sequence: "Sequence", config: Config) -> float:
-    """Seconds per unit of work, from a few iterations; compiles the kernels first, if that was not done."""
+def _timed_unit(sequence: "Sequence", config: Config, known: float | None = None) -> float:
+    """Seconds per unit of work, from a few iterations; compiles the kernels first, if that was not done.
+
+    known   what an earlier call of this command found, which is returned
+    """
+    if known is not None:
+        return known
     from endotsr.training.fitting.compile_ahead import compile_ahead
     from endotsr.training.runs.pace import seconds_of_unit
 
@@ -284,10 +298,12 @@ def _progress(
     config: Config,
     options: TrainOptions,
     at: "Standing | None" = None,
+    unit: float | None = None,
 ) -> Progress:
     """The progress of a training, on standard error and as a page in its folder; prints what the command will take.
 
-    at   progress of a run that is resumed; None = a new one
+    at     progress of a run that is resumed; None = a new one
+    unit   seconds per unit of work, if this command has timed it
     """
     import numba
 
@@ -305,7 +321,7 @@ def _progress(
         frames = frames.with_true_motion()
     perceived = lpips_file(options.lpips) is not None if options.evaluate else None
     pixels = sequence.width * sequence.height
-    speed = known_speed(threads, partial(_timed_unit, sequence, config) if pixels >= LEAST_PIXELS else None)
+    speed = known_speed(threads, partial(_timed_unit, sequence, config, unit) if pixels >= LEAST_PIXELS else None)
     plan = TimedCommand(config, frames, pixels, threads, perceived, vector_factor(), speed.beside)
     print(waiting_line(plan, speed, done_before(config).exists(), at))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)

@@ -158,10 +158,11 @@ def blended_finding(small: list[np.ndarray], steps: FloatArray, readable: BoolAr
     grey = [picture.astype(np.float32) for picture in small]
     threes = zip(grey, grey[1:], grey[2:])
     apart = [2 * np.abs(b - (a + c) / 2).mean() / max(np.abs(c - a).mean(), SAME) for a, b, c in threes]
-    less, more = sorted((float(np.median(apart[::2])), float(np.median(apart[1::2]))))
+    odd, even = (float(np.median(apart[first::2])) for first in (0, 1))  # of the frames 1, 3, ... and 2, 4, ...
+    less, more = sorted((odd, even))
     if less > BLENDED or less > BY_TURNS * more:
         return []
-    kept = "::2" if np.median(apart[::2]) < np.median(apart[1::2]) else "1::2"
+    kept = "::2" if odd < even else "1::2"
     what = (
         f"every second picture is the mean of its neighbours (its distance from it is {less:.2f} of half their"
         f" distance, that of the others {more:.2f}); without them: --frames {kept}"
