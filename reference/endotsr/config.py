@@ -12,6 +12,7 @@ import msgspec
 
 from endotsr.errors import InputError
 from endotsr.untrusted.json import Keys
+from endotsr.untrusted.names import choice
 from endotsr.untrusted.sections import (
     Count,
     Fraction,
@@ -21,7 +22,6 @@ from endotsr.untrusted.sections import (
     Section,
     SectionType,
     checked,
-    choice,
     refuse_unknown_keys,
 )
 from endotsr.untrusted.toml import read_toml, toml_text
