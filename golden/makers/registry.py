@@ -3,7 +3,7 @@
 A family is a module of this folder with OPERATIONS (the operations of its cases) and cases(). An operation is declared
 in one family, in DECLARED: see `makers.operations`. The mistakes of a family are in a TOML file of the same name, see
 `makers.wrong.wrong_ports`. A mistake belongs to the family of the rule that it breaks; if it also affects cases of
-later families, it lists their operations.
+other families, it lists their operations, or each of these has an entry with its lines.
 """
 
 import importlib
@@ -51,12 +51,14 @@ def all_specs() -> list[Spec]:
 
 
 def all_wrong_ports() -> dict[str, WrongPort]:
-    """Every wrong port by its flag. Raises ValueError for duplicate flags."""
+    """Every wrong port by its flag; see `wrong_ports`. Raises ValueError for a flag with two titles, or with none."""
+    ports = [port for family in FAMILIES for port in wrong_ports(family)]
     found: dict[str, WrongPort] = {}
-    for wrong_port in (port for family in FAMILIES for port in wrong_ports(family)):
-        if wrong_port.flag in found:
-            raise ValueError(f"wrong port {wrong_port.flag} is named twice")
-        found[wrong_port.flag] = wrong_port
+    for port in sorted(ports, key=lambda port: not port.title):
+        first = found.get(port.flag)
+        if bool(first) == bool(port.title):
+            raise ValueError(f"wrong port {port.flag} is named twice" if first else f"wrong port {port.flag}: no title")
+        found[port.flag] = first.joined(port) if first else port
     return found
 
 

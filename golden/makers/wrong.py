@@ -29,6 +29,10 @@ class WrongPort(NamedTuple):
     edits: tuple[Edit, ...]  # the mistake, in the source of the reference
     rounding: bool = False  # loses digits and is right otherwise: its wrong digits differ from port to port
 
+    def joined(self, other: "WrongPort") -> "WrongPort":
+        """The same mistake in the operations of a further family, too."""
+        return self._replace(operations=self.operations + other.operations, edits=self.edits + other.edits)
+
 
 SLOW = ("render", "objective", "training")  # operations that take seconds without the compiler
 ALWAYS = "render/paper"  # their only case on which every mistake in a kernel is examined
@@ -49,7 +53,8 @@ def wrong_ports(family: str) -> Iterator[WrongPort]:
 
     An entry has the keys `title`, `wrong` and `changes`, and may have `operations` and `rounding`. A change is [module,
     old text, new text, number of places]. The default module is in the head of the file, the default number is 1.
-    `operations` in the head is the default of the entries.
+    `operations` in the head is the default of the entries. An entry without a title has the same mistake as the entry
+    with this name in another family: it adds its operations and changes.
     """
     file = Path(__file__).with_name(f"{family}.toml")
     table = tomllib.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
@@ -57,7 +62,8 @@ def wrong_ports(family: str) -> Iterator[WrongPort]:
     for flag, entry in table.items():
         edits = tuple(_edit(change, module) for change in entry["changes"])
         examined = tuple(entry.get("operations", operations).split())
-        yield WrongPort(flag, entry["title"], entry["wrong"], examined, edits, entry.get("rounding", False))
+        texts = (entry.get("title", ""), entry.get("wrong", ""))
+        yield WrongPort(flag, *texts, examined, edits, entry.get("rounding", False))
 
 
 def _edit(change: Sequence[Any], module: str) -> Edit:

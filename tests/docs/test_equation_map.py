@@ -8,7 +8,7 @@ from book_map import UNDIFFERENTIATED, Equation, equations, golden_cases, has_de
 from package_names import DEFINITION, NOTEBOOKS, ROOT, definitions, equation_pages, linkable  # pyright: ignore[reportMissingImports]
 
 from endotsr.port.gradcheck import all_pairs
-from endotsr.port.judge.about import PAGES
+from endotsr.port.judge.about import page_of
 
 PAPER = ["1", "1b", *"234567"]
 ROWS = {row.label: row for row in equations()}
@@ -69,9 +69,9 @@ def test_every_pair_stands_in_the_map():
 
 
 def test_a_request_names_the_page_of_its_equation():
-    labels = {case["equation"] for cases in golden_cases().values() for case in cases} - {""}
-    pages = {label: ROWS[label.lower()].page for label in labels}
-    assert {equation: PAGES.get(equation) for equation in pages} == pages, "add it to PAGES in port/judge/about.py"
+    named = {(case["equation"], case["operation"]) for cases in golden_cases().values() for case in cases}
+    pages = {one: f"docs/specification/{ROWS[one[0].lower()].page}.md" for one in named if one[0]}
+    assert {one: page_of(*one) for one in pages} == pages, "add it to PAGES in port/judge/about.py"
 
 
 def test_every_reason_belongs_to_an_equation():

@@ -81,13 +81,23 @@ def test_a_flag_or_case_that_is_given_twice_is_refused(monkeypatch):
         all_wrong_ports()
 
 
+def test_a_mistake_of_another_family_has_the_changes_of_both_and_needs_a_title_in_one(monkeypatch):
+    """`laplacian.toml` has its lines of a mistake of `masked_l1`, which comes later."""
+    monkeypatch.setattr(registry, "FAMILIES", ("laplacian", "masked_l1"))
+    mistake = all_wrong_ports()["sign_of_zero"]
+    assert mistake.title and sorted(mistake.operations) == ["laplacian", "masked_l1"]
+    assert {edit.module for edit in mistake.edits} == {"method.equations.laplacian", "method.losses.masked_l1"}
+    monkeypatch.setattr(registry, "FAMILIES", ("laplacian",))
+    with pytest.raises(ValueError, match="mean_of_nothing: no title"):
+        all_wrong_ports()
+
+
 @pytest.mark.slow
 def test_what_is_published_keeps_its_place_and_what_is_new_follows():
     """Files, flags and mistakes, for a manifest that lists one of two cases of `laplacian` and two flags."""
     three = ("motion/generic", "laplacian/co_sited", "laplacian/tiny")
-    ports = [port for family in ("motion", "laplacian") for port in wrong_ports(family)]
-    solved = solve_these([spec for spec in all_specs() if spec.name in three],
-                         [port for port in ports if not set(port.operations) & {"masked_l1"}])  # fmt: skip
+    ports = [port for port in all_wrong_ports().values() if "masked_l1" not in port.operations]
+    solved = solve_these([spec for spec in all_specs() if spec.name in three], ports)
     names = ("laplacian/tiny", "motion/generic")
     files = tuple(next(f for f in PUBLISHED.files if f.path == f"cases/{name}/case.json") for name in names)
     flags = {flag: PUBLISHED.flags[flag] for flag in ("upsampling_swapped", "mask_before_pyramid")}

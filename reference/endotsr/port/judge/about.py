@@ -1,16 +1,16 @@
 """Descriptions in a request: the page of the equation, and the axes of the arrays by name.
 
-In: an equation, or the name of an array and the number of its axes. Out: a page of docs/specification, the axes.
+In: an equation and its operation, or the name of an array and the number of its axes. Out: a page of
+docs/specification, the axes.
 """
 
+import re
+
 PAGES = {
-    "1": "01_dictionary", "1b": "01_dictionary", "2": "02_appearance", "3": "03_motion", "4": "04_matern",
-    "5": "05_laplacian", "6": "06_objective", "7": "07_calibration", "B1": "b01_deformation", "B2": "b02_covariance",
-    "B3": "b03_projection", "B4": "b04_harmonics", "B5": "b05_compositing", "B6": "b06_masked_l1",
-    "B7": "b07_masked_ssim", "B8": "b08_depth", "B9": "b09_smoothness", "B10": "b10_adam", "B11": "b11_density",
-    "B12": "b12_initialisation", "B13": "b13_exposure", "B16": "b16_pose", "B19": "b19_registration",
+    "1": "01_dictionary", "1b": "01_dictionary", "2": "02_appearance", "6": "06_objective",
+    "B5": "b05_compositing", "B8": "b08_depth", "B10": "b10_adam",
 }  # fmt: skip
-"""Equation -> its page in docs/specification."""
+"""Pages of docs/specification with another name than that of the operation; `b06_masked_l1` is that of (B6)."""
 
 _AXES = {
     "Gaussian": "opacity_logit depth visible pruned cloned split parent moments_kept mean_gradient",
@@ -63,9 +63,10 @@ _BY_NAME = {
 _ITERATIONS = ("rate_", "term_", "square_")
 
 
-def page_of(equation: str) -> str:
-    """The page of an equation, "" for an operation without an equation."""
-    return f"docs/specification/{PAGES[equation]}.md" if equation else ""
+def page_of(equation: str, operation: str) -> str:
+    """The page of the equation of an operation, "" for an operation without an equation."""
+    number = re.sub(r"\d+", lambda digits: digits[0].zfill(2), equation.lower())
+    return f"docs/specification/{PAGES.get(equation, f'{number}_{operation}')}.md" if equation else ""
 
 
 def axes_of(name: str, count: int) -> str:

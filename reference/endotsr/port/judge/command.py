@@ -79,7 +79,7 @@ def _request(case: Case, level: int) -> Request:
     }
     return Request(
         family=case.family, case=case.case, operation=case.operation, equation=case.equation,
-        page=page_of(case.equation), settings=case.settings,
+        page=page_of(case.equation, case.operation), settings=case.settings,
         inputs={name: array.file for name, array in case.inputs.items()}, about=about, outputs=outputs,
     )  # fmt: skip
 

@@ -39,7 +39,8 @@ def _frame(dtype: np.dtype) -> dict[str, NDArray]:
 
 
 def _l1_trace(inputs: Inputs, settings: Settings, saved: MaskedL1Saved) -> dict[str, NDArray]:
-    return {"sign": np.sign(inputs["rendered"] - inputs["observed"]).astype(int)}
+    difference = np.where(inputs["mask"], inputs["rendered"] - inputs["observed"], 0)
+    return {"sign": np.sign(difference).astype(int)}
 
 
 def _l1_inputs(rng: Random) -> dict[str, NDArray]:
@@ -81,7 +82,7 @@ def _depth_reverse(module: Any, cotangents: Inputs, saved: tuple[Any, Any]) -> F
 
 def _depth_trace(inputs: Inputs, settings: Settings, saved: tuple[Any, Any]) -> dict[str, NDArray]:
     rendered = inputs["rendered_depth"]
-    residual = rendered / rendered.max() - saved[1].normalised
+    residual = np.where(saved[1].valid, rendered / rendered.max() - saved[1].normalised, 0)
     return {"peak": np.array(int(rendered.argmax())), "sign": np.sign(residual).astype(int)}
 
 

@@ -1,7 +1,5 @@
 """Stages of the whole method: the moving scene, the objective (6) with every gradient, and its repetition."""
 
-from typing import NamedTuple
-
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +7,9 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv.filters import canny_edges
 from endotsr.clips.sequences.sequence import Frame
 from endotsr.config import Config, LossConfig, ModelConfig
-from endotsr.method.equations.laplacian import laplacian_levels
+from endotsr.port.stages import laplacian, losses
 from endotsr.port.stages.compositing import render_decisions
+from endotsr.port.stages.laplacian import LEVELS
 from endotsr.port.stages.made_up import COUNT, HEIGHT, LENS, WIDE, WIDTH, pose, raw_gaussians
 from endotsr.port.stages.requests import (
     camera_of,
@@ -23,7 +22,7 @@ from endotsr.port.stages.requests import (
 )
 from endotsr.port.stages.stage import Blocks, Found, Inputs, Settings, Stage, Variant, split_blocks
 from endotsr.training.fitting.model import SceneSaved, scene_at
-from endotsr.training.fitting.objective import Targets, frame_targets, full_weights
+from endotsr.training.fitting.objective import frame_targets, full_weights
 from endotsr.training.fitting.view import ViewGradients, view_gradients
 from endotsr.training.scene.parameters import Exposure
 
@@ -43,27 +42,19 @@ def _scene(inputs: Inputs, settings: Settings) -> tuple[Found, SceneSaved]:
 # ---- the objective (6) ----
 
 
-class ObjectiveSaved(NamedTuple):
-    """Inputs of the reverse pass, of the further outputs and of the trace."""
-
-    view: ViewGradients
-    targets: Targets
-
-
-def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, ObjectiveSaved]:
+def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, ViewGradients]:
     """Equation (6) of one view. Edges of the smoothness term are detected unless the request has them."""
     loss, camera = msgspec.convert(settings["loss"], LossConfig), camera_of(inputs, settings)
     assert isinstance(loss.lambda_lap, float)
     config = Config(model=model_of(settings), loss=loss)
     frame = Frame(inputs["observed"], inputs["mask"], inputs["prior_depth"], settings["t"], camera)
-    targets = frame_targets(frame, config)
     weights = full_weights(loss, loss.lambda_lap)
     view = view_gradients(
-        gaussians_of(inputs), spectral_of(inputs, settings), targets, weights, config, camera, settings["t"],
-        inputs.get("edges"), exposure=_exposure(inputs), raster=raster_of(settings), degree=settings["degree"],
-        compositor=compositor_of(settings),
+        gaussians_of(inputs), spectral_of(inputs, settings), frame_targets(frame, config), weights, config, camera,
+        settings["t"], inputs.get("edges"), exposure=_exposure(inputs), raster=raster_of(settings),
+        degree=settings["degree"], compositor=compositor_of(settings),
     )  # fmt: skip
-    return {"objective": view.loss}, ObjectiveSaved(view, targets)
+    return {"objective": view.loss}, view
 
 
 def _exposure(inputs: Inputs) -> Exposure | None:
@@ -72,36 +63,32 @@ def _exposure(inputs: Inputs) -> Exposure | None:
     return Exposure(inputs["exposure_log_gain"], inputs["exposure_bias"]) if given else None
 
 
-def _objective_reverse(cotangents: Inputs, saved: ObjectiveSaved) -> Found:
+def _objective_reverse(cotangents: Inputs, view: ViewGradients) -> Found:
     """The gradients of the view, times the cotangent of the loss."""
-    view, up = saved.view, float(cotangents["objective"])
+    up = float(cotangents["objective"])
     d_exposure = {} if view.d_exposure is None else view.d_exposure._asdict()
     gradients = view.gradients | {f"exposure_{name}": array for name, array in d_exposure.items()}
     return {f"d_{name}": array * array.dtype.type(up) for name, array in gradients.items()}
 
 
-def _images_and_terms(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) -> Found:
+def _images_and_terms(inputs: Inputs, settings: Settings, view: ViewGradients) -> Found:
     """Images and unweighted terms; a term of weight 0 is not evaluated."""
     names = {"matern_penalty": "penalty"}
-    terms = {f"term_{names.get(name, name)}": value for name, value in saved.view.terms.items()}
-    return terms | {"colour_image": saved.view.rendered.colour, "depth_image": saved.view.rendered.depth}
+    terms = {f"term_{names.get(name, name)}": value for name, value in view.terms.items()}
+    return terms | {"colour_image": view.rendered.colour, "depth_image": view.rendered.depth}
 
 
-def _objective_trace(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) -> dict[str, NDArray]:
-    """Decisions of the render, signs of every absolute value, the depth maximum and the edges."""
-    (colour, depth, _), targets = saved.view.rendered, saved.targets
-    assert targets.depth is not None
-    difference = np.where(targets.mask, colour - targets.image, 0)
-    residual = np.where(targets.depth.valid, depth / depth.max() - targets.depth.normalised, 0)
-    outside = np.where(targets.mask, 0, np.concatenate([colour, depth[None]]))
-    signed = {"l1": difference, "depth": residual}
-    signed |= {f"band {j}": band for j, band in enumerate(laplacian_levels(difference).bands)}
-    signed |= {f"steps {axis}": np.diff(outside, axis=axis) for axis in (1, 2)}
-    return render_decisions(saved.view.render_saved) | {
-        "edges": canny_edges(depth).astype(int),
-        "peak": np.array(depth.argmax()),
-        **{name: np.sign(array).astype(int) for name, array in signed.items()},
-    }
+def _objective_trace(inputs: Inputs, settings: Settings, view: ViewGradients) -> dict[str, NDArray]:
+    """Decisions of the render, the edges, and what the stage of each loss decides at the rendered images."""
+    (colour, depth, _), fixed = view.rendered, {**settings["loss"], "levels": LEVELS}
+    edges = canny_edges(depth)
+    seen = {"rendered": colour, "rendered_depth": depth, "edges": edges, **inputs}
+    found = render_decisions(view.render_saved) | {"edges": edges.astype(int)}
+    for stage in (*losses.STAGES, *laplacian.STAGES):
+        if stage.trace is not None:
+            decided = stage.trace(seen, fixed, stage.forward(seen, fixed)[1])
+            found |= {f"{stage.name} {name}": array for name, array in decided.items()}
+    return found
 
 
 def _objective_inputs(rng: np.random.Generator) -> dict[str, NDArray]:
@@ -150,6 +137,7 @@ CHECKED = {
     "raster": raster_dict(WIDE),
     "model": msgspec.to_builtins(ModelConfig(bases=BASES, frequencies=FREQUENCIES, initial_width=0.2)),
     "loss": {
+        **{name: 0.5 for name in LossConfig.__struct_fields__ if name.endswith("_weight")},
         "ssim_weight": 0.3,
         "depth_weight": 1.0,
         "smoothness_weight": 0.05,
