@@ -1,4 +1,4 @@
-"""The elements of every chapter of the book: motive, derivation, figures, exercises and run time.
+"""The elements of every chapter of the book: equations, motive, derivation, figures, exercises and run time.
 
     python docs/make.py book.chapters measure [NUMBER ...]   run these notebooks, or all, at their small size
                                                              on one thread, and keep the stored times of the others
@@ -31,6 +31,7 @@ class Chapter(NamedTuple):
     """The elements of a notebook."""
 
     title: str
+    equations: str  # that the text before the first section names, as links
     motive: str  # the first sentences before the first section
     steps: int  # numbered steps of a derivation
     derived: bool  # a section on the reverse pass
@@ -47,8 +48,10 @@ def chapter_of(text: str) -> Chapter:
     opening = re.split(r"\n## |\n%%|\n\$\$", rest)[0].strip()
     sentences = re.split(r"(?<=[.?!])\s+", " ".join(opening.split("\n\n")[0].split()))
     last = prose.partition("\n## Exercise")[2]
+    announced = re.findall(r"\{eq\}`eq-[\w-]+`", rest.split("\n## ")[0])
     return Chapter(
-        title, " ".join(sentences[:2]), len(re.findall(r"^\*\*\(\d+\.\d+\)", prose, re.M)),
+        title, " ".join(dict.fromkeys(announced)), " ".join(sentences[:2]),
+        len(re.findall(r"^\*\*\(\d+\.\d+\)", prose, re.M)),
         "\n## The reverse pass" in prose, text.count("plt.show()"), text.count("data-widget="),
         len(re.findall(r"^\d\. ", last, re.M)), len(re.findall(r"`--only \w+`", last)),
     )  # fmt: skip
@@ -102,13 +105,13 @@ def table(times: dict[str, Any]) -> str:
         figures = f"{chapter.figures}" + (f", {chapter.plays} interactive" if chapter.plays else "")
         exercises = f"{chapter.exercises}, {chapter.judged} judged"
         cells = [steps, figures, exercises, "not measured" if spent is None else f"{spent:.0f} s"]
-        rows.append([f"{{doc}}`{name}`", chapter.motive, *cells])
+        rows.append([f"{{doc}}`{name}`", chapter.equations, chapter.motive, *cells])
     total = sum(row["processor_seconds"] for row in times["chapters"].values())
     about = (
         f"Run: processor time at the small size on one thread, kernels compiled before; {total / 60:.1f} minutes "
         f"together ({where_and_cores(times)}). *Judged*: by golden cases."
     )
-    return noted(("Chapter", "Motive", "Derivation", "Figures", "Exercises", "Run"), rows, about)
+    return noted(("Chapter", "Equations", "Motive", "Derivation", "Figures", "Exercises", "Run"), rows, about)
 
 
 PROGRAM = Program(
