@@ -39,7 +39,7 @@ def run_write(options: argparse.Namespace) -> int:
     folder = golden_folder(options.golden)
     lines = write(folder, options.families)
     print("\n".join(lines) or "no expected value moved")
-    remedy = f"; raise {folder / 'VERSION'}, if this change has not raised it yet" if lines else ""
+    remedy = f"; {folder / 'README.md'} gets a new version, if this change has none yet" if lines else ""
     print(f"golden: written, {len(lines)} changes{remedy}", file=sys.stderr)
     return 1
 

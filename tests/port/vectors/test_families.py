@@ -12,7 +12,7 @@ from endotsr.port.judge.format import Manifest, read_struct
 from endotsr.port.judge.store import golden_folder, read_golden
 from makers import registry
 from makers.files import fresh_files, rendered_files
-from makers.generate import solve_these
+from makers.generate import solve_these, version_of
 from makers.registry import FAMILIES, all_specs, all_wrong_ports, families
 from makers.wrong import wrong_ports
 
@@ -71,6 +71,14 @@ def test_another_version_than_that_of_the_files_is_refused_with_the_remedy(tmp_p
     (tmp_path / "VERSION").write_text("99.0.0\n")
     with pytest.raises(InputError, match=r"VERSION says 99.0.0, .*; take both .*`python golden/make.py write`"):
         read_golden(tmp_path)
+
+
+def test_the_version_is_the_newest_of_the_text_with_its_last_patch(tmp_path):
+    assert f"{version_of(golden_folder())}\n" == (golden_folder() / "VERSION").read_text()
+    (tmp_path / "README.md").write_text(
+        "### 4.7\n\n- 4.7.2: a text.\n- 4.7.1: a text.\n\n### 4.6\n\n- 4.6.3: a text.\n"
+    )
+    assert version_of(tmp_path) == "4.7.2"
 
 
 def test_a_flag_or_case_that_is_given_twice_is_refused(monkeypatch):
