@@ -16,6 +16,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from endotsr.clips.sequences.record import SequenceRecord
@@ -183,7 +184,7 @@ def open_windows(run: Path) -> WindowedScene:
 
 
 def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecord:
-    """The record of the covered frames as one sequence.
+    """The record of the covered frames as one sequence. What is not of single frames is taken from the first.
 
     A frame is held out if a window holds it out and none trains on it. A copy of a held-out frame is neither.
     `cameras` are the first window's, valid for a static camera; for a moving one see `WindowedScene.cameras`.
@@ -196,15 +197,14 @@ def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecor
         trained |= {window.first + i for i in record.train_index}
         held_out |= {window.first + i for i in record.test_index}
     frames = sorted(names)
-    return SequenceRecord(
-        unit=records[0].unit,
+    return msgspec.structs.replace(
+        records[0],
         largest_depth=max(record.largest_depth for record in records),
         static_camera=all(record.static_camera and record.cameras == records[0].cameras for record in records),
         names=[names[g] for g in frames],
         times=[g / plan.frames for g in frames],
         train_index=[j for j, g in enumerate(frames) if g in trained],
         test_index=[j for j, g in enumerate(frames) if g in held_out - trained],
-        cameras=records[0].cameras,
         duration=sum(record.duration for record in records) * plan.frames / sum(record.count for record in records),
     )
 
