@@ -6,7 +6,7 @@ Iterations count from 1. Lengths are in scene units (millimetres for EndoNeRF).
 
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypedDict
 
 import msgspec
 
@@ -141,6 +141,17 @@ class LossConfig(Section, frozen=True, kw_only=True):
     """r of the calibration"""
     calibration_views: PositiveCount = 16
     """training views used by the calibration"""
+
+
+class LossTerms(TypedDict, total=False):
+    """The terms of eq. (6) in the log, unweighted; a term that is not evaluated is missing."""
+
+    l1: float
+    ssim: float
+    depth: float
+    smoothness: float
+    matern_penalty: float
+    laplacian: float
 
 
 class OptimiserConfig(Section, frozen=True, kw_only=True):

@@ -31,11 +31,6 @@ def test_the_target_is_zero_where_there_is_no_prior():
     assert target.normalised[1:].min() > 0 and target.normalised.max() == 1
 
 
-def test_a_soft_mask_is_refused():
-    with pytest.raises(ValueError, match="mask must be boolean"):
-        depth_target(depths()[1], tool_mask().astype(float))
-
-
 LARGEST = {"on tissue": [(0, 3)], "on the tool": [(5, 12)], "two equal ones": [(2, 2), (0, 9)]}
 
 

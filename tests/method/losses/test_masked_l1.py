@@ -1,10 +1,8 @@
 """Masked L1 (B6)."""
 
 import numpy as np
-import pytest
 
 from endotsr.method.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
-from method.by_threads import assert_threads_change_no_bit
 from method.losses.made_up_images import images, tool_mask
 
 U32 = 2.0**-24
@@ -29,28 +27,3 @@ def test_one_value_is_an_image():
     loss, saved = masked_l1_forward(np.full((1, 1, 1), 0.75), np.full((1, 1, 1), 0.25), np.ones((1, 1), bool))
     assert loss == 0.5
     assert masked_l1_reverse(3.0, saved) == 3.0
-
-
-def test_nan_on_tissue_is_not_hidden():
-    rendered, observed = images()
-    rendered[0, 0, 0] = np.nan
-    assert np.isnan(masked_l1_forward(rendered, observed, tool_mask())[0])
-
-
-def test_same_bits_for_one_and_two_threads():
-    rendered, observed = (a.astype(np.float32) for a in images((3, 40, 33)))
-
-    def compute():
-        loss, saved = masked_l1_forward(rendered, observed, tool_mask((40, 33)))
-        return loss, masked_l1_reverse(1.0, saved)
-
-    assert_threads_change_no_bit(compute)
-
-
-@pytest.mark.parametrize(
-    "mask", [np.ones((12, 17), np.uint8) * 255, np.ones((12, 16), bool), np.ones((3, 12, 17), bool)]
-)
-def test_refuses_a_mask_that_is_not_boolean_or_does_not_fit(mask):
-    rendered, observed = images()
-    with pytest.raises(ValueError):
-        masked_l1_forward(rendered, observed, mask)

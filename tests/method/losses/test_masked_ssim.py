@@ -16,7 +16,6 @@ from endotsr.method.losses.masked_ssim import (
     ssim_target,
     window,
 )
-from method.by_threads import assert_threads_change_no_bit
 from method.losses.made_up_images import images, tool_mask
 from oracle.complex_step import derivative
 
@@ -147,11 +146,6 @@ def test_float32_gradient_against_float64():
     assert gradient.dtype == np.float32
     assert abs(value - wide) <= 20 * U32 * (1 - wide)
     assert np.linalg.norm(gradient - wide_gradient) <= 1e-5 * np.linalg.norm(wide_gradient)
-
-
-def test_same_bits_for_one_and_two_threads():
-    rendered, observed = (a.astype(np.float32) for a in images((3, 40, 33)))
-    assert_threads_change_no_bit(lambda: ssim(rendered, observed, tool_mask((40, 33))))
 
 
 def test_target_is_zero_under_the_mask():

@@ -5,7 +5,6 @@ import pytest
 
 from endotsr.definition import smoothness as definition
 from endotsr.method.losses.smoothness import smoothness_forward, smoothness_reverse
-from method.by_threads import assert_threads_change_no_bit
 from method.losses.made_up_images import images, tool_mask
 
 FACTOR = 30.0
@@ -88,7 +87,7 @@ def test_hard_D6_depths_above_255_are_not_wrapped():
     assert two == 64 * one
 
 
-def test_float32_and_threads():
+def test_float32():
     depth, rendered, mask, edges = case((40, 33))
     depth, rendered = depth.astype(np.float32), rendered.astype(np.float32)
     loss, grads = loss_and_gradients(depth, rendered, mask, edges)
@@ -97,9 +96,3 @@ def test_float32_and_threads():
     assert abs(loss - wide) <= 1e-6 * wide
     for narrow, exact in zip(grads, wide_grads):
         assert np.linalg.norm(narrow - exact) <= 1e-6 * np.linalg.norm(exact)
-
-    def compute():
-        found, both = loss_and_gradients(depth, rendered, mask, edges)
-        return found, *both
-
-    assert_threads_change_no_bit(compute)

@@ -34,6 +34,7 @@ from endotsr.port.stages.registry import all_stages
 from endotsr.port.stages.requests import Tape, camera_of, config_of, initialisation_of, model_of, raster_of, sequence_of
 from endotsr.port.stages.stage import Found, Inputs, Settings, Stage
 from endotsr.training.fitting.model import raster_settings
+from endotsr.training.fitting.objective import full_weights
 
 IMAGES = ("colour_image", "depth_image", "opacity_image")
 
@@ -175,7 +176,7 @@ def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
     config = Config(model=model_of(settings), loss=loss)
     frame = objective.Frame(inputs["observed"], inputs["mask"], inputs["prior_depth"], settings["t"], camera)
     laplacian = loss.lambda_lap if config.model.laplacian else 0.0
-    weights = objective.full_weights(loss, laplacian)
+    weights = objective.LossWeights(*full_weights(loss, laplacian))
     exposed = (inputs["exposure_log_gain"], inputs["exposure_bias"]) if "exposure_bias" in inputs else None
     found = view.view_gradients(
         _gaussians(inputs), _spectral(inputs, settings), objective.frame_targets(frame, config), weights, config,

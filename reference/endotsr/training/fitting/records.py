@@ -2,19 +2,8 @@
 
 from typing import NamedTuple, Required, TypedDict
 
+from endotsr.config import LossTerms
 from endotsr.untrusted.json import Keys
-
-
-class LossTerms(TypedDict, total=False):
-    """The terms of equation (6), unweighted; a term that is not evaluated is missing."""
-
-    l1: float
-    ssim: float
-    depth: float
-    smoothness: float
-    matern_penalty: float
-    laplacian: float
-
 
 TERMS = tuple(LossTerms.__annotations__)
 
