@@ -8,20 +8,20 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "where_to_change.md"
 CODE = ("reference/endotsr/", "golden/makers/")
-CHANGES = {  # the most files of code that a change may take
-    "loss term": 6,
-    "camera model": 3,
-    "reader of depth": 4,
-    "time basis": 4,
-    "parameter of each frame": 6,
-    "window of the SSIM": 1,
-    "flag": 3,
-    "golden case": 1,
-    "optimiser": 5,
-    "effect of the simulator": 4,
-    "row of the report": 1,
-    "key of a reader": 5,
-    "record of a run": 4,
+CHANGES = {  # the most files that a change may take: of code, and as proof
+    "loss term": (5, 7),
+    "camera model": (3, 4),
+    "reader of depth": (4, 3),
+    "time basis": (4, 4),
+    "parameter of each frame": (6, 3),
+    "window of the SSIM": (1, 3),
+    "flag": (1, 2),
+    "golden case": (1, 3),
+    "optimiser": (5, 4),
+    "effect of the simulator": (4, 3),
+    "row of the report": (1, 2),
+    "key of a reader": (5, 7),
+    "record of a run": (3, 4),
 }
 
 SECTIONS = re.findall(r"^## \d+\. (.+?)\n(.*?)(?=^## |\Z)", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
@@ -55,9 +55,9 @@ def test_the_changes_are_all_there():
 
 
 @pytest.mark.parametrize("body, most", [(body, most) for (_, body), most in zip(SECTIONS, CHANGES.values())], ids=IDS)
-def test_every_file_exists_and_no_change_takes_more_files_of_code_than_it_did(body, most):
+def test_every_file_exists_and_no_change_takes_more_files_than_it_did(body, most):
     code, proof = files_of(body, "Code"), files_of(body, "Proof")
-    assert 0 < len(code) <= most and proof
+    assert 0 < len(code) <= most[0] and 0 < len(proof) <= most[1]
     assert all(path.strip("[]").startswith(CODE) for path in code)
     for path in (*code, *proof):
         new = path.startswith("[")
