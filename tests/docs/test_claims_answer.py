@@ -6,7 +6,7 @@ import re
 import pytest
 from pages.bench import minutes
 from pages.claims import page as claims
-from pages.claims.answer import _decided, _stands, splits, with_other_weights
+from pages.claims.answer import _cells, _stands, splits, with_other_weights
 from pages.claims.estimates import Estimate, contrast
 from pages.claims.rules import LEAST_PAIRS
 from pages.claims.verdicts import CLIPS
@@ -21,10 +21,11 @@ def made() -> dict[str, str]:
 def test_the_answer_has_both_verdicts_where_they_differ():
     """The interval of three seeds alone, and that with the spread of all configurations: one may decide."""
     apart = Estimate((0.2, 0.3, 0.5), 0.33, 0.3, (-0.05, 0.71), (0.2, 0.47))
-    said = _decided(apart, 0.31, 0.66)
-    assert said.endswith("contains 0 too; with the spread pooled over all configurations +0.20 to +0.47 dB, reproduced")
-    assert "pooled" not in _decided(apart._replace(common=(-0.1, 0.7)), 0.31, 0.66)
-    assert "pooled" not in _decided(apart._replace(common=None), 0.31, 0.66)
+    open_, reproduced = "not decided: the interval contains 0 too", "reproduced"
+    assert _cells(apart, 0.31, 0.66) == ["+0.33", "-0.05 to +0.71", open_, "+0.20 to +0.47", reproduced]
+    assert _cells(apart._replace(common=(-0.1, 0.7)), 0.31, 0.66)[3:] == ["-0.10 to +0.70", open_]
+    one = apart._replace(values=(0.2,), paired=None, common=None)
+    assert _cells(one, 0.31, 0.66)[1:] == ["-", "not decided: 1 of 3 seeds"] * 2
 
 
 def test_the_answer_counts_every_measured_combination_and_names_the_shorter_runs(made):
@@ -39,6 +40,8 @@ def test_the_answer_counts_every_measured_combination_and_names_the_shorter_runs
         "The mean of the full method is below the blend in 2 of the 3 combinations of clip, size and held-out frames "
         "measured, 1 of them at 320x256 with 1750 iterations, 1 of them at 640x512 with 3000 iterations."
     )
+    pairs = splits({"pulling": {"rows": [row | {"sequence": "pulling_pairs"}]}}, [])
+    assert pairs.endswith("One clip of them is `pulling_pairs`, which is pulling without its last frame.")
     rows = [line.strip("| ").split(" | ") for line in made["protocols"].splitlines() if ", paper" in line]
     below = sum(float(cells[4]) < float(cells[6]) for cells in rows)
     assert f"below the blend in {below} of the {len(rows)} combinations" in made["answer"]
@@ -91,9 +94,8 @@ def test_the_answer_names_the_level_with_other_weights_of_ssim():
         for step in (-0.05, 0.0, 0.05)
     ]
     said = with_other_weights(rows)
-    assert "here 0.1: it is not reached on pulling with 0.0 (38.00 dB, 37.88 to 38.12 dB) and 0.05 (38.50 dB, " in said
-    assert (
-        "; it lies in the interval on pulling with 0.2 (39.30 dB, " in said
-        and "is exceeded on pulling with 0.4" in said
-    )
+    assert "weight 0.1 of D-SSIM" in said
+    assert " With 0.0 (38.00 dB, 37.88 to 38.12 dB) and 0.05 (38.50 dB, " in said
+    for told in ("it is not reached", "it lies in the interval", "it is exceeded"):
+        assert f" dB) {told} on pulling." in said
     assert "0.1 (" not in said and with_other_weights(rows[:2]) == with_other_weights([]) == ""

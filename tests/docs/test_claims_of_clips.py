@@ -1,6 +1,6 @@
 """Claims over two clips: no table mixes them, and a verdict has the seeds of the clip with the fewest."""
 
-from pages.claims.answer import components
+from pages.claims.answer import gains
 from pages.claims.estimates import Estimate, averaged
 from pages.claims.parts import protocols
 from pages.claims.rules import increment_verdict
@@ -39,6 +39,7 @@ def test_a_step_of_fewer_seeds_than_the_whole_says_so():
 
     rows = [row(name, seed, psnr) for name, psnr in (("base", 40.1), ("A+S+L", 40.8)) for seed in range(3)]
     rows += [row("S", 0, 40.2), row("A+S", 0, 40.7)]
-    said = components({"cutting": {"rows": rows}})
-    assert "by +0.70 dB on cutting (95 % interval over the seeds +0.70 to +0.70 dB; direction reproduced" in said
-    assert "The step of A is +0.50 dB (one seed) on cutting (published" in said
+    said = gains({"cutting": {"rows": rows}})
+    assert "| +0.31 to +0.66 | cutting | +0.70 | +0.70 to +0.70 | direction reproduced, size not | " in said
+    assert "| A, over S | +0.29 | cutting | +0.50 | - | not decided: 1 of 3 seeds | " in said
+    assert "mean of both |" not in said

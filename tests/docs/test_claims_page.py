@@ -327,14 +327,14 @@ def test_the_answer_says_what_the_records_say():
     record = stored("pulling")
     text = parts()["answer"]
     whole, step = psnr(record, "A+S+L") - psnr(record, "base"), psnr(record, "A+S") - psnr(record, "S")
-    assert f"by {whole.mean():+.2f} dB on pulling (95 % interval over the seeds " in text
     low, high = stats.ttest_1samp(whole, 0.0).confidence_interval(0.95)
     assert low < 0 < high
-    assert f"{low:+.2f} to {high:+.2f} dB; not decided: the interval contains 0 too; with the spread pooled" in text
-    assert f"The step of A is {step.mean():+.2f} dB on pulling" in text
+    found = f"| pulling | {whole.mean():+.2f} | {low:+.2f} to {high:+.2f} | not decided: the interval contains 0 too |"
+    assert found in text and f"| A, over S | +0.29 | pulling | {step.mean():+.2f} | " in text
     of_cutting = psnr(stored("cutting"), "A+S") - psnr(stored("cutting"), "S")
     both = (step.mean() + of_cutting.mean()) / 2
-    assert f"{of_cutting.mean():+.2f} dB on cutting, {both:+.2f} dB in their mean (published +0.29 dB, mean of" in text
+    assert f"| +0.29 | cutting | {of_cutting.mean():+.2f} | " in text
+    assert f"| +0.29 | mean of both | {both:+.2f} | " in text
     level, base = psnr(record, "A+S+L"), psnr(record, "base")
     assert f"| pulling | 39.34 | {level.mean():.2f} ± " in text and f"| {base.mean():.2f} ± " in text
     truth = json.loads((claims.RESULTS / "effects_truth.json").read_text(encoding="utf-8"))["scenes"]["motion"]
@@ -343,7 +343,9 @@ def test_the_answer_says_what_the_records_say():
     assert f"{motion.mean():+.2f} ± {(high - low) / 2:.2f} dB where only the tissue moves" in text
     bare = answer(claims.RESULTS, {"pulling": record, "cutting": None}, [], "")
     assert "on cutting is not finished" in bare and "right camera" not in bare and "1 combinations" in bare
-    assert "in their mean" not in bare and "iterations" not in next(row for row in bare.splitlines() if "combin" in row)
+    assert "mean of both |" not in bare and "iterations" not in next(
+        row for row in bare.splitlines() if "combin" in row
+    )
     assert "| cutting | 40.96 | - | - | 42.80 |" in bare
 
 

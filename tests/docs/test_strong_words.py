@@ -68,6 +68,7 @@ def test_what_gains_in_every_seed():
         gains("ablation_pulling_half", "every_second", "A+S+L", "base"),
         gains("ablation_pulling_half_blocks", "blocks 2", "A+S+L", "base"),
         gains("ablation_pulling_half_fixed", "every_eighth", "A+S+L fixed", "A+S fixed"),
+        gains("ablation_pulling_half_fixed", "every_eighth", "A+S+L", "A+S"),
     ):
         assert len(found) == 3 and min(found) > 0
 

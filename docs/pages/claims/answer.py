@@ -29,6 +29,7 @@ PREDICTIONS = ("two_neighbours", "flow_interpolation", "two_neighbours_tissue", 
 NAMES = ("the blend", "flow", "the tissue-only blend", "the tissue-only flow")  # of the predictions, in their order
 FIXED_GAIN = next(one for one in COMPARISONS if one.claim == "A and L added to S, fixed count")
 STEP_OF_A = next(one for one in COMPARISONS if (one.with_, one.without) == tuple(STEPS["A"]))
+PAIRS = "`pulling_pairs`"
 METHOD, WITHOUT_A = "`paper`", "`paper` without A"
 Record = Any  # content of a file of docs/results
 
@@ -40,71 +41,56 @@ def answer(folder: Path, found: Mapping[str, Record | None], half: list[Record |
     """
     known = {clip: found[clip] for clip in CLIPS if contrast(found[clip], WHOLE, "psnr_full") is not None}
     weights = with_other_weights(rows_of(FOLDER / "similarity_weight.toml"))
-    parts = [components(known), at_fixed_count(known), reached(known) + weights] if known else []
+    parts = [reached(known) + weights] if known else []
     parts += [beaten(folder, clip, record) for clip, record in known.items()]
     parts.append(splits(found, half))
     if right_eye:
         parts.append(f"On the right camera at held-out times the components change PSNR by {right_eye}.")
     parts.append(truth(loaded(folder / "effects_truth.json")))
     parts += [f"The ablation on {clip} is not finished." for clip in CLIPS if clip not in known]
-    return "\n".join(f"- {part}" for part in parts if part) + "\n\n" + levels(folder, found)
+    listed = "\n".join(f"- {part}" for part in parts if part)
+    return "\n\n".join([*([gains(known)] if known else []), listed, levels(folder, found)])
 
 
-def components(known: Mapping[str, Record]) -> str:
-    """The gain of all three components over the base, and of the step of A, clip by clip."""
-    wholes = {clip: contrast(record, WHOLE, "psnr_full") for clip, record in known.items()}
-    steps = {clip: contrast(record, STEPS["A"], "psnr_full") for clip, record in known.items()}
+def gains(known: Mapping[str, Record]) -> str:
+    """Published and measured changes of PSNR by the components, with their intervals and verdicts, as a table."""
     least, most = MATCHED_PSNR
-    changes = [
-        f"{gain.mean:+.2f} dB on {clip} ({_decided(gain, least, most)})"
-        for clip, gain in wholes.items()
-        if gain is not None
-    ]
-    text = f"The three components together change the PSNR of their base by {' and by '.join(changes)}"
-    text += f"; the published medians are {least:+.2f} to {most:+.2f} dB, by sequence."
-    measured = {clip: step for clip, step in steps.items() if step is not None}
-    if not measured:
-        return text
-    both = f", {averaged([*measured.values()]).mean:+.2f} dB in their mean" if len(measured) == len(CLIPS) else ""
-    published = STEP_OF_A.published[BOTH]["psnr_full"]
-    return f"{text} The step of A is {_by_clip(measured)}{both} (published {published:+.2f} dB, mean of both clips)."
+    step, fixed = STEP_OF_A.published[BOTH]["psnr_full"], FIXED_GAIN.published
+    of_fixed = {FIXED_GAIN.with_: 1, FIXED_GAIN.without: -1}
+    rows = []
+    for clip, gain in _by_clip(known, WHOLE).items():
+        rows.append(["A, S and L, over the base", f"{least:+.2f} to {most:+.2f}", clip, *_cells(gain, least, most)])
+    steps = _by_clip(known, STEPS["A"])
+    both = {"mean of both": averaged([*steps.values()])} if len(steps) == len(CLIPS) else {}
+    for clip, gain in (steps | both).items():
+        rows.append(["A, over S", f"{step:+.2f}", clip, *_cells(gain, step, step)])
+    for clip, gain in _by_clip(known, of_fixed).items():
+        published = fixed[clip]["psnr_full"]
+        rows.append(["A and L, over S, fixed number", f"{published:+.2f}", clip, *_cells(gain, published, published)])
+    head = ["Change by", "published", "EndoNeRF", "here", "interval", "verdict", "pooled interval", "verdict with it"]
+    about = (
+        "Changes of PSNR in dB with 95 % intervals over the seeds, by A (colour residual), S (motion residual) and L"
+        " (Laplacian detail loss). *Pooled*: with the spread over all configurations. *Fixed number*: of Gaussians. The"
+        " published changes over the base are medians, by sequence; that of A over S is the mean of both clips."
+        " *Reproduced*: the interval meets the published value or range and does not contain 0."
+    )
+    return noted(head, rows, about)
 
 
-def at_fixed_count(known: Mapping[str, Record]) -> str:
-    """The gain of A and L over S alone with the same number of Gaussians, clip by clip; "" if it is not measured."""
-    texts = []
-    for clip, record in known.items():
-        gain = contrast(record, {FIXED_GAIN.with_: 1, FIXED_GAIN.without: -1}, "psnr_full")
-        if gain is not None:
-            published = FIXED_GAIN.published[clip]["psnr_full"]
-            verdict = f"published {published:+.2f} dB, {_decided(gain, published, published)}"
-            texts.append(f"{gain.mean:+.2f} dB on {clip} ({verdict})")
-    if not texts:
-        return ""
-    return f"With a fixed number of Gaussians, A and L together change the PSNR of S by {' and by '.join(texts)}."
+def _by_clip(known: Mapping[str, Record], terms: Mapping[str, int]) -> dict[str, Estimate]:
+    """The change of PSNR on every clip on which it was measured."""
+    found = {clip: contrast(record, terms, "psnr_full") for clip, record in known.items()}
+    return {clip: gain for clip, gain in found.items() if gain is not None}
 
 
-def _decided(gain: Estimate, least: float, most: float) -> str:
-    """The interval of a gain over the seeds and the verdict on the published range, of rounded values in dB."""
+def _cells(gain: Estimate, least: float, most: float) -> list[str]:
+    """Mean, interval and verdict on the published range, of rounded values in dB, and both with the pooled spread."""
     least, most = least - ROUNDED["psnr_full"], most + ROUNDED["psnr_full"]
-    verdict = increment_verdict(least, gain.paired, len(gain.values), most)
-    if gain.paired is None:
-        return verdict
-    low, high = gain.paired
-    text = f"95 % interval over the seeds {low:+.2f} to {high:+.2f} dB; {verdict}"
-    if gain.common is None or (other := increment_verdict(least, gain.common, len(gain.values), most)) == verdict:
-        return text
-    low, high = gain.common
-    return f"{text}; with the spread pooled over all configurations {low:+.2f} to {high:+.2f} dB, {other}"
-
-
-def _by_clip(gains: Mapping[str, Estimate]) -> str:
-    """Gains with the clip of each, and with the number of seeds where that is not the usual one."""
-    texts = []
-    for clip, gain in gains.items():
-        seeds = f" ({seeds_of(len(gain.values))})" if len(gain.values) < LEAST_PAIRS else ""
-        texts.append(f"{gain.mean:+.2f} dB{seeds} on {clip}")
-    return " and ".join(texts)
+    cells = [f"{gain.mean:+.2f}"]
+    for limits in (gain.paired, gain.common):
+        cells.append("-" if limits is None else f"{limits[0]:+.2f} to {limits[1]:+.2f}")
+        cells.append(increment_verdict(least, limits, gain.seeds, most))
+    return cells
 
 
 def interval(record: Record) -> tuple[float, tuple[float, float] | None]:
@@ -151,8 +137,9 @@ def with_other_weights(rows: list[Record]) -> str:
         stands.setdefault(f"{_stands(limits, published)} on {clip}", []).append(level)
     if not stands:
         return ""
-    used, texts = f"{PAPER.loss.ssim_weight:g}", [f"it {told} with {' and '.join(of)}" for told, of in stands.items()]
-    return f" The paper does not print the weight of D-SSIM, here {used}: {'; '.join(texts)}."
+    texts = [f"With {' and '.join(of)} it {told}." for told, of in stands.items()]
+    used = f" This is with the weight {PAPER.loss.ssim_weight:g} of D-SSIM; the paper does not print its own."
+    return " ".join([used, *texts])
 
 
 def levels(folder: Path, found: Mapping[str, Record | None]) -> str:
@@ -232,6 +219,7 @@ def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str
         below += sum(row["psnr_tissue"] for row in rows) / len(rows) < blend
     if not groups:
         return ""
+    clips = {sequence for sequence, _, _ in groups}
     measured = f"{len(groups)} combinations of clip, size and held-out frames measured"
     firsts = [rows[0] for rows in groups.values()]
     short = Counter(
@@ -243,7 +231,8 @@ def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str
         f", {count} of them at {width}x{height} with {iterations} iterations"
         for (width, height, iterations), count in sorted(short.items())
     )
-    return f"The mean of the full method is below the blend in {below} of the {measured}{shorter}."
+    twice = f" One clip of them is {PAIRS}, which is pulling without its last frame." if PAIRS[1:-1] in clips else ""
+    return f"The mean of the full method is below the blend in {below} of the {measured}{shorter}.{twice}"
 
 
 def truth(found: Record) -> str:
