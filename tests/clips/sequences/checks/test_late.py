@@ -85,6 +85,18 @@ def test_a_simulated_clip_has_no_finding_and_its_late_masks_have_one(name):
         assert [f.code for f in parts.findings("masks", "depth")] == ["late-masks"]
 
 
+@pytest.mark.parametrize(("order", "words"), [(slice(None, None, -1), "in reversed order"), (slice(0, 27), "late")])
+def test_masks_from_the_last_to_the_first_are_no_late_masks_where_an_instrument_comes_and_goes(order, words):
+    """Moved by seven frames, the masks in reversed order tell more of the colours than unmoved, but less than turned."""
+    settings = msgspec.structs.replace(named_scene("pulling"), frames=32, width=160, height=128)
+    clip, parts = simulate(settings).sequence, LateParts()
+    masks = clip.masks[order]
+    for picture, tissue in zip(clip.images[-len(masks) :], masks):
+        parts.add(picture.transpose(1, 2, 0), tissue, None)
+    (found,) = parts.findings("masks", "depth")
+    assert found.code == "late-masks" and words in found.what
+
+
 @pytest.mark.parametrize("lag", [0, 1, 3, -5])
 def test_steps_of_a_right_view_tell_its_moment(lag):
     """Fast and slow motion, with a little noise in both views; a shift of one frame is within what cameras do."""

@@ -65,7 +65,7 @@ class LateParts:
         if len(self._tissue) < 2 * FARTHEST + FEWEST:
             return []
         tissue, colours = np.stack(self._tissue), np.stack(self._colours)
-        found = late_masks(colours, tissue, masks) or reversed_masks(colours, tissue, masks)
+        found = masks_of_other_moments(colours, tissue, masks)
         return found or (late_depth(np.stack(self._known), tissue, depth) if len(self._known) == len(tissue) else [])
 
 
@@ -77,14 +77,31 @@ def loaded_late_findings(sequence: Sequence, masks: str, depth: str) -> list[Fin
     return parts.findings(masks, depth)
 
 
-def late_masks(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list[Finding]:
-    """A warning on masks that fit the pictures of other frames better.
+def masks_of_other_moments(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list[Finding]:
+    """A warning on masks that fit the pictures of other frames better: moved by some frames, or the last one first.
 
     colours   (n, h, w) numbers of quantised colours
     tissue    (n, h, w)
+
+    Of the two, what tells more of the colours; of an instrument that enters, late masks and reversed ones look alike.
     """
+    late, turned = late_masks(colours, tissue, where), reversed_masks(colours, tissue, where)
+    if not (late and turned):
+        return late or turned
     middle = slice(FARTHEST, len(tissue) - FARTHEST)
-    moved = {k: tissue[FARTHEST + k : len(tissue) - FARTHEST + k] for k in SHIFTS}
+    moved = max(mutual_information(colours[middle], moved) for moved in _moved(tissue).values())
+    return turned if mutual_information(colours[middle], tissue[::-1][middle]) > moved else late
+
+
+def _moved(tissue: BoolArray) -> dict[int, BoolArray]:
+    """By shift, the masks that it gives the frames in the middle."""
+    return {k: tissue[FARTHEST + k : len(tissue) - FARTHEST + k] for k in SHIFTS}
+
+
+def late_masks(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list[Finding]:
+    """A warning on masks that fit the pictures some frames before or after better; see `masks_of_other_moments`."""
+    middle = slice(FARTHEST, len(tissue) - FARTHEST)
+    moved = _moved(tissue)
     known = {k: mutual_information(colours[middle], moved[k]) for k in SHIFTS}
     best = max(SHIFTS, key=lambda k: known[k])
     if abs(best) < SHORTEST or known[best] < max(known[0] + INFORMED, TIMES * known[0]):
@@ -102,7 +119,7 @@ def late_masks(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list
 
 
 def reversed_masks(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list[Finding]:
-    """A warning on masks that fit the pictures better from the last to the first; arguments as `late_masks`."""
+    """A warning on masks that fit the pictures better from the last to the first; see `masks_of_other_moments`."""
     known, turned = (mutual_information(colours, masks) for masks in (tissue, tissue[::-1]))
     if turned < max(known + INFORMED, TIMES * known):
         return []
