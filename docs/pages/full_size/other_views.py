@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
-from endotsr.clips.opencv.geometry import features_of, matched_features
+from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.sequences.checks.stereo import PairViews, rows_apart
 from endotsr.clips.simulator import SimulatorSettings
 from endotsr.config import PAPER
 from endotsr.errors import InputError
@@ -34,7 +34,6 @@ from pages.store.program import Program
 from pages.store.tables import noted, where
 
 MODEL, MOVED = "this model", "left picture moved by the prior depth"
-FAR = 8  # rows
 COLUMNS = {  # measurement -> its columns: key, head, decimals
     "right_view": (("held_out_psnr", "Right camera, held-out times, dB", 2),
                    ("training_psnr", "Right camera, training times, dB", 2)),
@@ -62,23 +61,23 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             raise InputError(f"{source}: {name}: {entry['reason']}")
         entry["rows"] = [row for row in entry.get("rows", ()) if row["label"] != MODEL]
     hashes = input_record(source, sequence, PAPER, SimulatorSettings()).get("arrays_sha256", {})
-    apart = rows_apart(options.clip)
+    apart = rows_of_pairs(options.clip)
     return {"clip": Path(source).name, "measures": found, "rows_apart": apart, "arrays_sha256": hashes}
 
 
-def rows_apart(clip: Path) -> list[float]:
-    """The median vertical distance of matched features of a pair, in pixels, at every eighth frame.
+def rows_of_pairs(clip: Path) -> float:
+    """How far points lie above or below their row in the left view, median in pixels, as `endotsr check` finds it.
 
-    Features that differ by more than FAR rows are wrong matches, such as those on the instruments.
+    Raises InputError where too few points agree.
     """
-    found = []
-    for pair in list(zip(*(sorted((clip / side).glob("*.png")) for side in ("images", "images_right"))))[::8]:
-        greys = [np.array(Image.open(path).convert("L")) for path in pair]
-        left, right = (features_of(grey, np.ones(grey.shape, bool)) for grey in greys)
-        here, there = matched_features(left, right)
-        rows = np.abs(left.place[here, 1] - right.place[there, 1])
-        found.append(float(np.median(rows[rows < FAR])))
-    return found
+    files = list(zip(*(sorted((clip / side).glob("*.png")) for side in ("images", "images_right")), strict=True))
+    views = PairViews(len(files))
+    for i, pair in enumerate(files):
+        views.add(i, *(read_picture(file) for file in pair))
+    apart = rows_apart(views.rows)
+    if not apart.size:
+        raise InputError(f"{clip}: too few points are in both views of the pairs")
+    return float(np.median(apart))
 
 
 def table(record: Mapping[str, Any]) -> str:

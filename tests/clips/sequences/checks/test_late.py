@@ -87,7 +87,7 @@ def test_a_simulated_clip_has_no_finding_and_its_late_masks_have_one(name):
 
 @pytest.mark.parametrize(("order", "words"), [(slice(None, None, -1), "in reversed order"), (slice(0, 27), "late")])
 def test_masks_from_the_last_to_the_first_are_no_late_masks_where_an_instrument_comes_and_goes(order, words):
-    """Moved by seven frames, the masks in reversed order tell more of the colours than unmoved, but less than turned."""
+    """Moved by seven frames, masks in reversed order tell more of the colours than unmoved, but less than turned."""
     settings = msgspec.structs.replace(named_scene("pulling"), frames=32, width=160, height=128)
     clip, parts = simulate(settings).sequence, LateParts()
     masks = clip.masks[order]

@@ -14,7 +14,14 @@ from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences import folder_reader
 from endotsr.clips.sequences.checks import frame_pass
 from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.checks.stereo import frozen_finding, late_finding, pair_findings, row_finding, row_matches
+from endotsr.clips.sequences.checks.stereo import (
+    exchanged_finding,
+    frozen_finding,
+    late_finding,
+    pair_findings,
+    row_finding,
+    row_matches,
+)
 from endotsr.clips.sequences.layouts import describe_for_training
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.simulator.folder import write_sequence
@@ -64,6 +71,20 @@ def test_prepare_pairs_the_views_paired_by_time(late, tmp_path, capsys):
         for k, file in enumerate(sorted(files.iterdir())):
             np.testing.assert_array_equal(read_png(file), read_png(clip / name / f"{first + k + shift:06d}.png"))
         assert len(list(files.iterdir())) == FRAMES - abs(late)
+
+
+@pytest.mark.parametrize("late", [0, 1])
+def test_exchanged_views_are_named_before_anything_else(late, tmp_path):
+    ((code, what),) = said([(right, left) for left, right in pairs(late=late)], tmp_path)
+    assert code == "exchanged-views" and "pixels farther right in the right view" in what
+
+
+def test_points_on_both_sides_are_no_exchanged_views():
+    """As of cameras that look at one point, which is among the matches."""
+    found = row_matches(*pairs()[0])
+    assert [f.code for f in exchanged_finding([found._replace(across=-found.across)], "right")] == ["exchanged-views"]
+    some = np.where(np.arange(found.across.size) % 4, -found.across, found.across)
+    assert exchanged_finding([found._replace(across=some)], "right") == exchanged_finding([], "right") == []
 
 
 def test_without_motion_up_or_down_a_late_view_looks_like_another_depth(tmp_path):

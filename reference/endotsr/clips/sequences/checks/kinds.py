@@ -117,6 +117,12 @@ KINDS: dict[str, Kind] = {
                      " --crop"),
     "same-views": Kind("warning", "equal views have no parallax, and a depth of them is no measurement",
                        "export the right view again"),
+    "exchanged-views": Kind("warning", "in a rectified pair points lie farther left in the right view, where stereo"
+                            " matching searches: left and right are exchanged, both views are mirrored, or their"
+                            " principal points differ",
+                            "store the left pictures in images/ and the right ones in images_right/, with masks and"
+                            " depth of the left ones; of a recording, prepare it with the calibration of both cameras:"
+                            " --calibration FILE"),
     "frozen-right-view": Kind("warning", "depth from such a pair joins two moments",
                               "record or export the right view again, or leave these frames out: endotsr prepare"
                               " --drop"),
