@@ -20,6 +20,7 @@ OPPOSITE = {
     "axes turned as from LLFF": "LLFF axes", "unit x 1000": "unit / 1000", "unit / 1000": "unit x 1000",
     "one frame late": "one frame early", "one frame early": "one frame late",
     "quaternions w x y z": "quaternions x y z w", "quaternions x y z w": "quaternions w x y z",
+    "reversed order": "reversed order",
 }  # fmt: skip
 
 
@@ -33,6 +34,10 @@ def test_a_misreading_is_named_with_its_remedy(wrong):
     found = agreement(MATCHER, wrong.poses, PAIRS)
     assert (found.verdict, found.reading) == ("misread", OPPOSITE[wrong.name])
     assert found.remedy and found.reading in found.sentence
+
+
+def test_the_misreadings_above_are_tried():
+    assert {reading.name for reading in readings(TRUE)} == set(OPPOSITE)
 
 
 @pytest.mark.parametrize(("order", "name"), [([3, 0, 1, 2], "w x y z"), ([1, 2, 3, 0], "x y z w")])

@@ -38,6 +38,7 @@ REMEDIES = {
     "unit / 1000": "a unit 1000 times as short: prepare --trajectory-unit, or unit in sequence.toml",
     "one frame late": "frame k belongs to pose k + 1: leave out the first pose and the last frame",
     "one frame early": "frame k belongs to pose k - 1: leave out the last pose and the first frame",
+    "reversed order": "the last pose belongs to the first frame: write the poses from the last to the first",
 }
 
 
@@ -55,6 +56,7 @@ def readings(poses: list[CameraPose]) -> list[Reading]:
         "unit / 1000": _placed(turn, centre / TO_MM),
         "one frame late": poses[1:] + poses[-1:],
         "one frame early": poses[:1] + poses[:-1],
+        "reversed order": poses[::-1],
     }
     for name, order in ORDERS.items():
         found[f"quaternions {name}"] = _placed(_reordered(turn, order), centre)
