@@ -96,8 +96,8 @@ plt.show()
 
 # %% [markdown]
 # The objective is a weighted sum of losses. L and the Matérn prior of S are terms of it; A and S change the render. Each
-# $\mathcal L$ and $\mathcal S$ is a number for one render and one frame, except $\mathcal L_{\mathrm{msp}}$, which
-# depends on the coefficients of S alone. The other factors are weights, $i$ is the iteration, and a bracket
+# $\mathcal L$, and the similarity $\mathcal S$ (not component S), is a number for one render and one frame, except
+# $\mathcal L_{\mathrm{msp}}$, which depends on the coefficients of S alone. The other factors are weights, $i$ is the iteration, and a bracket
 # $[\,\cdot\,]$ is 1 if its condition holds and 0 otherwise. {doc}`14_full_sequence` has the table of these terms and
 # weights.
 #
@@ -192,8 +192,8 @@ runs = {
 # %% [markdown]
 # ## The numbers
 #
-# *Training* and *held out* are the mean PSNR over tissue ({eq}`eq-m1` in {doc}`14_full_sequence`) of the training frames
-# and of the held-out frames, in dB; a higher value is better. *Trajectory error* is the mean distance between the motion
+# *Training* and *held out* are the mean PSNR (peak signal-to-noise ratio) over tissue of the training frames and of the
+# held-out frames, in dB ({eq}`eq-m1` in {doc}`14_full_sequence`); a higher value is better. *Trajectory error* is the mean distance between the motion
 # of the model and the true motion, in pixels; the last column is the error of a model that stands still. Before you read
 # on, write down a prediction for each clip: which component gains on the training frames, and does it gain on the
 # held-out frames as well?
@@ -222,7 +222,7 @@ def gain(name, variant):
 # ## The pictures
 #
 # The figures show one held-out frame of the first two clips. The lower row of each has the absolute error over tissue,
-# from 0 (black) to 0.1 (pale yellow), and on its left the change of the frame since frame 0.
+# from 0 (black) to 0.1 (pale yellow), where 1 is white, and on its left the change of the frame since frame 0.
 
 
 # %% tags=["hide-input"]

@@ -15,8 +15,8 @@
 #
 # Colours change during a clip: the exposure drifts, and tissue becomes pale under pressure. Component A lets the
 # colour of each Gaussian follow such a change. Whatever its coefficients are, the displayed colour differs from that
-# without A by at most $\beta$. This bound limits the size of the residual. It does not limit what the residual represents, as the end of
-# the next section shows.
+# without A by at most $\beta$. This bound limits the size of the residual. It does not limit what the residual
+# represents, as the end of the next section shows.
 #
 # | Symbol | Meaning | Shape in the code |
 # |---|---|---|
@@ -89,9 +89,9 @@ assert not np.any(appearance_forward(zero, phi_bar, beta)[0])
 
 # %% [markdown]
 # **The limit of the bound.** Each Gaussian has its own coefficients, so neighbours may change in opposite directions.
-# Consider a texture with a contrast of 0.28 that moves across Gaussians that do not move. The contrast is within the
-# bound of 0.3, and the residual can reproduce this motion of the texture. The bound alone does not distinguish such a
-# texture from a change of the light.
+# Consider a texture that moves across Gaussians that do not move. Its contrast, from the darkest to the brightest place,
+# is 0.28; the bound of 0.3 in both directions would allow 0.6. The residual can reproduce this motion of the texture. The
+# bound alone does not distinguish such a texture from a change of the light.
 
 # %%
 place = np.linspace(0, 1, N)

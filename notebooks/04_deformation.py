@@ -152,7 +152,12 @@ for panel, width in ((axes[0], 0.01), (axes[1], 0.05)):
     highest = values.max(axis=1)
     panel.plot(fine, values, lw=0.8, color="tab:blue")
     panel.fill_between(fine, 0, 1, where=highest < 1e-3, color="tab:red", alpha=0.25, lw=0)
-    panel.set(title=f"{B} bases, width {width}", xlabel="t", xlim=(0, 0.5), ylim=(-0.03, 1.15))
+    panel.set(
+        title=f"values of {B} bases, width {width}",
+        xlabel="t",
+        xlim=(0, 0.5),
+        ylim=(-0.03, 1.15),
+    )
     assert (highest.min() < 1e-3) == (width == 0.01), "the wider bases leave no gap"
     if width == 0.01:
         frames = np.arange(63) / 63

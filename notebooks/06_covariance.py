@@ -346,7 +346,8 @@ for column, (a, b) in enumerate(((0, 1), (0, 2))):
         factor = np.linalg.cholesky(path[k][np.ix_([a, b], [a, b])])
         panel.plot(*(factor @ circle), color=plt.cm.viridis(np.log1p(k) / 6), lw=1.2)
     panel.plot(*(np.linalg.cholesky(target[np.ix_([a, b], [a, b])]) @ circle), "r--", lw=1.5)
-    panel.set(title=f"outline in {'xyz'[a]}{'xyz'[b]}: start dark, target red", aspect="equal")
+    panel.set(title="outline: start dark, target red", xlabel="xyz"[a], ylabel="xyz"[b])
+    panel.set_aspect("equal")
 panel = figure.add_subplot(1, 3, 3, projection="3d")
 u, v = np.mgrid[0 : 2 * np.pi : 40j, 0 : np.pi : 20j]
 ball = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)])

@@ -14,8 +14,8 @@
 # # 7. Perspective projection of a Gaussian
 #
 # An affine map sends a Gaussian to a Gaussian, and perspective is not affine. The centre is therefore projected
-# exactly, and the covariance by the first-order expansion of the projection at the centre (EWA splatting,
-# {doc}`/references`). The result is an ellipse on the screen.
+# exactly, and the covariance by the first-order expansion of the projection at the centre (EWA splatting, from
+# *elliptical weighted average*; {doc}`/references`). The result is an ellipse on the screen.
 #
 # The input of this stage is a Gaussian with the centre $\mu$, the rotation $R$ and the semi-axes $S$ of
 # {doc}`06_covariance`, and a camera. The output is the centre $(u,v)$ of the ellipse in pixels, its covariance with
@@ -223,7 +223,8 @@ for panel, (title, centre, axes_length) in zip(axes, scenes):
     assert abs(inside - 0.86) < 0.02 if small else round(inside, 2) == 0.83
     panel.plot(*outline, color="tab:blue", label="EWA, two standard deviations")
     panel.plot(*flat.mean2d, "r+", ms=10)
-    panel.set(title=title, xlim=(0, 64), ylim=(48, 0), aspect="equal")
+    panel.set(title=title, xlim=(0, 64), ylim=(48, 0), aspect="equal", xlabel="$u$, px")
+axes[0].set_ylabel("$v$, px")
 axes[0].legend(loc="lower left")
 
 lengths = np.geomspace(1, 3e4, 60)

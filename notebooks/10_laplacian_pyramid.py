@@ -20,7 +20,7 @@
 #
 # | Symbol | Meaning |
 # |---|---|
-# | $\hat I$, $I$ | render and frame, (3, H, W), display units; both are set to 0 at excluded pixels |
+# | $\hat I$, $I$ | render and frame, (3, H, W), in display units (0 is black, 1 is white); both are set to 0 at excluded pixels |
 # | $\mathsf D$, $\mathsf U$ | down-sampling to half the size, up-sampling to twice the size |
 # | $G_j$ | the image after $j$ down-samplings; $G_0$ is the image itself |
 # | $P_j$ | band $j$: what $G_{j-1}$ loses when it is down-sampled and up-sampled again |
@@ -234,7 +234,8 @@ assert np.array_equal(
 #
 # The upper row shows the valid values of each level. Grey is tissue whose value is not used, because its support
 # touches the instrument. The lower row shows the bands of the observed image if the image is multiplied by the mask
-# first and filtered afterwards. Where do you expect the strongest detail in these bands?
+# first and filtered afterwards, from 0 (black) to 0.2 (pale yellow). Where do you expect the strongest detail in these
+# bands?
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 4, figsize=(10.1, 4.6), layout="constrained")

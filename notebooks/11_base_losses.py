@@ -14,10 +14,11 @@
 # # 11. The base losses: L1, SSIM, depth and smoothness
 #
 # A render can have wrong colours, a wrong structure or a wrong depth, and under the instrument there is nothing to
-# compare it with. The base model has one loss for each of these cases. L1 compares the colour of each pixel, SSIM the
-# structure of the colours, and the depth loss the rendered depth with the prior depth. Smoothness constrains the
-# render under the instrument, and the depth on tissue. The two colour losses use no value under the instrument. In the
-# depth loss such values enter the two maxima alone, and smoothness reads the render there but not the frame.
+# compare it with. The base model has one loss for each of these cases. L1 compares the colour of each pixel, SSIM
+# (structural similarity) the structure of the colours, and the depth loss the rendered depth with the prior depth.
+# Smoothness constrains the render under the instrument, and the depth on tissue. The two colour losses use no value under
+# the instrument. In the depth loss such values enter the two maxima alone, and smoothness reads the render there but not
+# the frame.
 #
 # | Symbol | Meaning |
 # |---|---|

@@ -222,7 +222,7 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # half-size frame. For (20.6) it projects a point with the camera and with the half-size camera. For
 # (20.7) it halves the weight, which preserves the loss of the total variation of a slope and doubles the loss of its
 # squared steps. For noise that is independent between pixels, whose steps do not grow, half the weight halves the
-# loss. The factor is between these cases and was not tuned.
+# loss. The factor is a compromise between these cases and was not tuned.
 
 
 # %%
