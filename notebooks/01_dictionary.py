@@ -32,9 +32,9 @@
 # The equations are {eq}`eq-1` and {eq}`eq-1b` of {doc}`/specification/01_dictionary`. In the book such references are
 # links.
 #
-# A chapter with equations prints them as the specification prints them, followed by their **definition** in plain NumPy.
-# An `assert` then compares the definition with the compiled function. If the two differ there, the chapter stops
-# with an error.
+# A chapter with equations prints them as the specification prints them, followed by their **definition** in plain NumPy
+# where they have one. An `assert` then compares the definition with the compiled function. If the two differ there, the
+# chapter stops with an error.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 
