@@ -390,12 +390,15 @@ SHARP = Config(
     training=TrainingConfig(bridge_fraction=0.7),
 )
 SHARP = with_settings(with_iterations(SHARP, 3000), training={"visits_per_frame": 72})
+# 1.5 to 3 times those of `sharp`: docs/specification/rulings.md, "Presets of a run"
+QUICK_RATES = {"position": 3.2e-3, "deformation": 2.4e-3, "harmonics_base": 5e-3, "scale": 0.01, "rotation": 0.003}
 QUICK = with_settings(
     with_iterations(SHARP, 1600),
     preset="quick",
     # affordable for a first look at 640x512 pixels
     density={"growth": "budget", "maximum": 22_000},
     initialisation={"first_frame_points": 14_000, "other_frame_points": 2_000},
+    optimiser=QUICK_RATES,
     training={"coarse_start": True, "visits_per_frame": 29},  # 1600 iterations up to 55 training frames
 )
 DEMO = with_settings(
