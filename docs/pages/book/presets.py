@@ -1,7 +1,7 @@
 """The tables of the presets in README.md and which_preset.md: time of trainings and whole commands, memory, quality.
 
-The records are docs/results/minutes.json (`bench.minutes`), for whole commands waiting.json (`bench.waiting`), and
-for the simulated clip those of `book.running_clip` and of `full_size`.
+The records of quality are those of `full_size.record`, of times docs/results/minutes.json (`bench.minutes`), of whole
+commands waiting.json (`bench.waiting`), and of the simulated clip those of `book.running_clip` and of `full_size`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,19 +40,24 @@ def values(runs: Sequence[Mapping[str, Any]], columns: Columns) -> list[str]:
     ]
 
 
+def of_seeds(clip: str, name: str) -> list[dict[str, Any]]:
+    """Held-out means, memory and Gaussians of every recorded seed of a preset on a clip."""
+    return [
+        metrics["held_out"]["mean"] | {key: metrics["run"][key] for key in OF_RUN}
+        for key, metrics in record.stored(clip).items()
+        if f"_{name}_seed" in key
+    ]
+
+
 def table(columns: Columns = MEASURED) -> str:
     """One row per preset, the fastest first, means over the seeds; predictions without a model; clip and machine."""
     found = loaded(RESULTS / "minutes.json")
     presets = {name: runs for name, runs in found["rows"].items() if name in PRESETS}
-    rows = sorted((mean(run["seconds"] for run in runs), name, runs) for name, runs in presets.items())
+    timed = sorted((mean(run["seconds"] for run in runs), name) for name, runs in presets.items())
+    seeds = {name: of_seeds("pulling", name) or runs for name, runs in presets.items()}
     cells = [
-        [
-            f"`{name}`",
-            f"{seconds / 60:.1f}",
-            *values(of, columns),
-            str(len(of)),
-        ]
-        for seconds, name, of in rows
+        [f"`{name}`", f"{seconds / 60:.1f}", *values(seeds[name], columns), str(len(seeds[name]))]
+        for seconds, name in timed
     ]
     for name, values_of in minutes.baselines(found).items():
         cells.append([name, "-", *values([values_of], columns), "-"])
@@ -60,9 +65,9 @@ def table(columns: Columns = MEASURED) -> str:
     machines, threads = sorted({run["processor"] for run in runs}), sorted({run["threads"] for run in runs})
     clip = found["clip"]
     about = (
-        f"{clip['name']}, {clip['frames']} frames of {clip['size']}, every eighth held out; "
-        f"{' or '.join(map(str, threads))} threads of {', '.join(machines)}, {days(runs)}. The "
-        "time is that of the iterations on one machine; another one of this name took longer."
+        f"{clip['name']}, {clip['frames']} frames of {clip['size']}, every eighth held out; means over the seeds. The "
+        f"time is that of the iterations of one run with {' or '.join(map(str, threads))} threads of "
+        f"{', '.join(machines)}, {days(runs)}; another machine of this name took longer."
     )
     return noted(("Preset", "Training, minutes", *(head for head, *_ in columns), "Seeds"), cells, about)
 
@@ -100,18 +105,13 @@ def recorded() -> str:
 
 def cutting() -> str:
     """Presets and predictions without a model on the second recorded clip; `paper` is the ablation with everything."""
-    runs = {name: [metrics for key, metrics in record.stored("cutting").items() if f"_{name}_seed" in key]
-            for name in ("quick", "sharp")}  # fmt: skip
-    rows = {
-        name: [metrics["held_out"]["mean"] | {key: metrics["run"][key] for key in OF_RUN} for metrics in of]
-        for name, of in runs.items()
-    }
+    rows = {name: of_seeds("cutting", name) for name in ("quick", "sharp")}
     rows["paper"] = [
         row for row in loaded(RESULTS / "ablation_cutting.json")["rows"] if row["configuration"] == "A+S+L"
     ]
     columns = (*SIZES, *MEASURED)
     cells = [[f"`{name}`", *values(of, columns), str(len(of))] for name, of in rows.items()]
-    first = runs["quick"][0]
+    first = next(iter(record.stored("cutting").values()))
     for key in (*PREDICTIONS[1:], *TISSUE_ONLY):
         cells.append([LABELS[key], *values([first["baselines"][key]["mean"]], columns), "-"])
     source = first["run"]["input"]

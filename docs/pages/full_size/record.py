@@ -24,7 +24,10 @@ from pages.store.published import PUBLISHED, as_printed
 
 EVERY_EIGHTH = "every eighth frame"
 CLIPS = ("pulling", "cutting")
-PLANNED = {"pulling": {"paper": 3, "sharp": 3}, "cutting": {"paper": 5, "quick": 3, "sharp": 3}}  # seeds of a preset
+PLANNED = {
+    "pulling": {"paper": 3, "quick": 3, "sharp": 3},
+    "cutting": {"paper": 5, "quick": 3, "sharp": 3},
+}  # seeds of a preset
 MORE = (
     "[All runs, with blocks of frames held out, machine and times](docs/results/README.md). ± is a 95 % interval over "
     "the seeds."
