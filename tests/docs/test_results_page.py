@@ -78,7 +78,7 @@ def test_the_readme_states_the_minutes_that_were_timed():
     made = presets.table()
     assert all(f"| `{name}` |" in made for name in ("paper", "sharp", "quick")) and "--minutes" not in made
     assert "| flow | - | 41.61 | 0.0125 | - |" in made and "| flow | - | - | - | 41.61 |" in presets.recorded()
-    assert f"| {rows['quick'][0]['seconds'] / 60:.1f} |" in made and "another one of this name took longer" in made
+    assert f"| {rows['quick'][0]['seconds'] / 60:.1f} |" in made and "another machine of this name took longer" in made
     waited = json.loads((RESULTS / "waiting.json").read_text(encoding="utf-8"))["rows"]
     (other,) = [
         row for row in waited if (row["clip"], row["preset"], row["clock"]) == ("endonerf_pulling", "sharp", "wall")
