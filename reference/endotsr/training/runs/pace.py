@@ -48,7 +48,7 @@ def paced(config: Config, x: float) -> Config:
 
 
 def _rates(config: Config, x: float) -> dict[str, float]:
-    """The learning rates of x that replace those of `sharp`: between the presets geometric in x, beyond them constant."""
+    """The rates of x in place of those of `sharp`: between the presets geometric in x, beyond them constant."""
     inside, found = min(max(x, 0.0), 1.0), {}
     for name, quick in QUICK_RATES.items():
         sharp = getattr(SHARP.optimiser, name)
