@@ -110,6 +110,7 @@ def cost(found: Record | None, runs: list[Record]) -> str:
     whole = [row for row in rows if "fixed" not in row["configuration"]]  # the others train half of the iterations
     measured = [(row["seconds"], row["threads"]) for row in whole
                 if row.get("seconds") and row.get("threads") and row["preset"] == "paper"]  # fmt: skip
+    machine = f" on {found['machine']['processor']}, {found['date'][:10]}" if found is not None and measured else ""
     measured = measured or [
         (run["run"]["seconds"], run["run"]["threads"]) for run in runs if run["run"]["settings"]["preset"] == "paper"
     ]
@@ -120,7 +121,7 @@ def cost(found: Record | None, runs: list[Record]) -> str:
         [str(count), *(f"{planned_hours(count, cores, core_minutes):.1f}" for cores in PLANNED_CORES)]
         for count in PLANNED_RUNS
     ]
-    about = f"One run takes {core_minutes:.0f} core minutes (median of {len(measured)} measured)."
+    about = f"One run takes {core_minutes:.0f} core minutes (median of {len(measured)} measured{machine})."
     return f"{about}\n\n" + markdown(("runs", *(f"{n} cores, hours" for n in PLANNED_CORES)), cells)
 
 

@@ -128,7 +128,7 @@ def table(result: dict[str, Any]) -> str:
         if a in ways and b in ways
     ]  # fmt: skip
     about = (
-        f"Held-out frames of `{result['scene']}`, trained with `{result['training']}`. What changes the PSNR"
+        f"Held-out frames of `{result['scene']}`, trained with `{result['training']}`, one seed. What changes the PSNR"
         f" against the lossless pictures: {', '.join(changes)}. The given depth is rounded to whole millimetres. A"
         " compressed video loses sensor noise, which makes its own held-out frames easier to predict."
         f" {result['date'][:10]}."
