@@ -108,6 +108,19 @@ def test_commands_on_no_run(command, tmp_path, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_clip_or_a_part_of_a_run_in_place_of_a_run_names_what_to_use(folder, finished_run, tmp_path, capsys):
+    made = f"`endotsr train {folder} --out RUN` makes a run of it"
+    for words in (["evaluate"], ["render", "--out", str(tmp_path / "o")], ["train", "--resume", "--out"]):
+        assert_refused(capsys, [*words, str(folder)], f"{folder}: not a run folder, but a clip; {made}")
+    pictures = folder / "images"
+    assert_refused(capsys, ["evaluate", str(pictures)], f"`endotsr prepare {pictures} --out CLIP` makes a clip of it")
+    for part in ("renders", "metrics.json", "test/ours_30"):
+        assert_refused(capsys, ["evaluate", str(finished_run / part)], f"a part of one; use {finished_run}")
+    (tmp_path / "runs").mkdir()
+    shutil.copytree(finished_run, tmp_path / "runs/mine")
+    assert_refused(capsys, ["evaluate", str(tmp_path / "runs")], "use one of those in it: mine")
+
+
 def test_resume_of_nothing(tmp_path, capsys):
     assert_refused(capsys, ["train", "--out", str(tmp_path / "run"), "--resume"], "run folder not found")
 

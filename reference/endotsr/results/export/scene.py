@@ -22,6 +22,7 @@ from endotsr.results.export.ply import read_gaussians_noted
 from endotsr.training.fitting.model import corrected_cameras, render_at, scene_at, spectral_from, without
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.training.runs.model import Model, load_model
+from endotsr.training.runs.no_run import why_no_run
 from endotsr.training.scene.gaussians import Gaussians
 from endotsr.untrusted.names import choice
 
@@ -104,7 +105,9 @@ def open_scene(path: Path) -> MovingScene:
         slim = load_slim_model(path)
         return MovingScene(slim.record, slim.model)
     if path.is_file():
-        raise InputError(f"{path}: not a scene; use a run folder, a slim model (.npz) or a 3DGS file (.ply)")
+        raise InputError(
+            f"{path}: {why_no_run(path)}; a scene is a run folder, a slim model (.npz) or a 3DGS file (.ply)"
+        )
     folder = open_run(path)
     return MovingScene(folder.sequence_record(), folder=folder)
 

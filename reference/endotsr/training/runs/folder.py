@@ -183,9 +183,8 @@ def create_run(path: Path, config: Config, record: RunRecord, sequence_record: S
 def open_run(path: Path) -> RunFolder:
     """An existing run folder. Raises InputError if there is none."""
     path = Path(path)
-    if not path.is_dir():
-        raise InputError(f"{path}: run folder not found")
-    for name in ("config.toml", "run.json", "sequence.json"):
-        if not (path / name).is_file():
-            raise InputError(f"{path}: not a run folder: {name} is missing")
+    if not all((path / name).is_file() for name in ("config.toml", "run.json", "sequence.json")):
+        from endotsr.training.runs.no_run import why_no_run
+
+        raise InputError(f"{path}: {why_no_run(path)}")
     return RunFolder(path)
