@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from endotsr.cli.parts.related_options import RELATIONS
 from endotsr.cli.parts.relations import Needs, shown
-from endotsr.clips.formats.calibration_fields import INI, KALIBR, OPENCV, ROS
+from endotsr.clips.formats.calibration_fields import FLAT, INI, KALIBR, OPENCV, ROS
 from endotsr.clips.formats.inventory import Inventory
 from endotsr.clips.formats.matlab_calibrations import BOUGUET
 from endotsr.clips.formats.matlab_calibrations import CAMERA as MATLAB
@@ -32,7 +32,7 @@ from endotsr.results.report.tables import markdown
 from pages.store.program import Program
 
 INVENTORIES = (
-    FIELDS, FRAME_FIELDS, COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF, TRAJECTORY, KALIBR, ROS, OPENCV, INI, ORB,
+    FIELDS, FRAME_FIELDS, COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF, TRAJECTORY, KALIBR, ROS, OPENCV, FLAT, INI, ORB,
     EUROC, MATLAB, MATLAB_PAIR, BOUGUET, servct.FILES, servct.CAMERA, hamlyn.FILES, c3vd.FILES,
     scared.FILES, scared.FRAME, PNG, JPEG, WEBP, TIFF, BMP, MP4, MATROSKA, AVI, TRANSPORT, PROGRAM, DEPTH, CLOUD,
     GAUSSIAN,

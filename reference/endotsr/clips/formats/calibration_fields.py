@@ -6,6 +6,13 @@ OTHER_MODEL = "another camera model is not supported: calibrate as a pinhole cam
 RECTIFIED = "it follows from both cameras, and is computed again"
 OF_CALIBRATION = "it documents the calibration"
 
+PINHOLE = {  # values of fields that name the model, with which nothing is refused
+    "distortion_model": ("plumb_bob", "rational_polynomial", "radtan"),
+    "camera_model": ("pinhole", "PINHOLE", "perspective"),
+    "model": ("pinhole", "perspective"),
+    "model_type": ("PINHOLE",),
+}
+
 KALIBR = Inventory(
     "a camera of camchain.yaml of Kalibr",
     used={
@@ -39,12 +46,13 @@ ROS = Inventory(
     neutral={"binning_x": (1,), "binning_y": (1,)},
 )
 OPENCV = Inventory(
-    "storage of OpenCV in YAML, XML or JSON",
+    "storage of OpenCV in YAML, XML or JSON, and the same names in an .npz file",
     used={
-        "camera_matrix Camera_Matrix K cameraMatrix": "intrinsics of one camera",
-        "distortion_coefficients Distortion_Coefficients D distCoeffs": "its distortion",
-        "M1 M2 K1 K2 cameraMatrix1 cameraMatrix2": "intrinsics of a pair",
-        "D1 D2 distCoeffs1 distCoeffs2": "its distortions",
+        "camera_matrix Camera_Matrix K cameraMatrix mtx camera_mtx intrinsic_matrix": "intrinsics of one camera",
+        "distortion_coefficients Distortion_Coefficients D distCoeffs dist dist_coeffs dist_coeff distortion": "its"
+        " distortion",
+        "M1 M2 K1 K2 cameraMatrix1 cameraMatrix2 mtx1 mtx2 mtxL mtxR": "intrinsics of a pair",
+        "D1 D2 distCoeffs1 distCoeffs2 dist1 dist2 distL distR": "its distortions",
         "R T": "pose of the right camera relative to the left, millimetres",
         "image_width image_height image_Width image_Height width height": "size of the pictures",
     },
@@ -52,18 +60,32 @@ OPENCV = Inventory(
         "fisheye_model fisheye distortion_model camera_model model model_type xi skew": OTHER_MODEL,
     },
     harmless={
-        "E F R1 R2 P1 P2 Q H1 H2 rectified* roi1 roi2 validRoi* map*": RECTIFIED,
+        "E F R1 R2 P1 P2 Q H1 H2 rectified* roi roi1 roi2 validRoi* map*": RECTIFIED,
         "calibration_time calibration_Time nframes nrOfFrames board_* square_* Square_* flags flagValue *_error"
         " *_errors avg_* Avg_* per_view_* extrinsic_parameters Extrinsic_Parameters image_points Image_points"
-        " grid_points aspectRatio FixAspectRatio rms": OF_CALIBRATION,
+        " grid_points aspectRatio FixAspectRatio rms ret": OF_CALIBRATION,
         "rvecs tvecs": "the poses of the board do not concern the pictures of the clip",
     },
-    neutral={
-        "distortion_model": ("plumb_bob", "rational_polynomial", "radtan"),
-        "camera_model": ("pinhole", "PINHOLE", "perspective"),
-        "model": ("pinhole", "perspective"),
-        "model_type": ("PINHOLE",),
+    neutral=PINHOLE,
+    told={
+        "newcameramtx newCameraMatrix new_camera_matrix": "the camera of pictures that were undistorted with it; if"
+        " these are such pictures, state it with --camera",
     },
+)
+FLAT = Inventory(
+    "plain numbers fx, fy, cx, cy in JSON, YAML or an .npz file",
+    used={
+        "fx fy cx cy": "intrinsics, pixel centres at integers",
+        "width height w h image_width image_height": "size of the pictures",
+        "k1 k2 p1 p2 k3 k4 k5 k6": "distortion in the model of OpenCV",
+        "distortion_coefficients Distortion_Coefficients D distCoeffs dist dist_coeffs dist_coeff distortion": "the"
+        " same as a list",
+    },
+    refused={
+        "fisheye_model fisheye distortion_model camera_model model model_type xi skew": OTHER_MODEL,
+        "coeffs": "write the coefficients as k1, k2, p1, p2 and k3",
+    },
+    neutral=PINHOLE,
 )
 INI = Inventory(
     "a section of the ini file of StereoMIS",

@@ -19,7 +19,7 @@ from endotsr.clips.formats.files import shortened
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_text
-from endotsr.untrusted.json import Keys
+from endotsr.untrusted.json import Keys, number
 from endotsr.untrusted.names import choice, decimal_commas, plain_line
 from endotsr.untrusted.yaml import matrix, read_yaml
 
@@ -30,11 +30,13 @@ KALIBR_MODELS = {"camera_model": ("pinhole",), "distortion_model": ("radtan", "n
 ROS_MODELS, ROS_MARK = ("plumb_bob", "rational_polynomial"), "projection_matrix"
 ECHO = {"k": "camera_matrix", "d": "distortion_coefficients", "r": "rectification_matrix", "p": ROS_MARK,
         "width": "image_width", "height": "image_height"}  # fmt: skip
-# Key names are free in OpenCV's YAML: these are the names of OpenCV's samples, SCARED and common tools.
-ONE = (("camera_matrix", "distortion_coefficients"), ("Camera_Matrix", "Distortion_Coefficients"), ("K", "D"),
-       ("cameraMatrix", "distCoeffs"))  # fmt: skip
-PAIRS = (("M1", "D1", "M2", "D2"), ("K1", "D1", "K2", "D2"), ("cameraMatrix1", "distCoeffs1", "cameraMatrix2",
-         "distCoeffs2"))  # fmt: skip
+# Key names are free in OpenCV's files: these are the names of OpenCV's samples and tutorials, SCARED and common tools.
+MATRICES = ("camera_matrix", "Camera_Matrix", "K", "cameraMatrix", "mtx", "camera_mtx", "intrinsic_matrix")
+DISTORTIONS = ("distortion_coefficients", "Distortion_Coefficients", "D", "distCoeffs", "dist", "dist_coeffs",
+               "dist_coeff", "distortion")  # fmt: skip
+PAIRS = (("M1", "M2"), ("K1", "K2"), ("cameraMatrix1", "cameraMatrix2"), ("mtx1", "mtx2"), ("mtxL", "mtxR"))
+PAIR_DISTORTIONS = (("D1", "D2"), ("distCoeffs1", "distCoeffs2"), ("dist1", "dist2"), ("distL", "distR"))
+CAMERA_NAMES = frozenset({*MATRICES, *(name for names in PAIRS for name in names)})
 SIZES = (("image_width", "image_height"), ("image_Width", "image_Height"), ("width", "height"))
 
 
@@ -276,25 +278,35 @@ def _ros_camera(path: Path, keys: Keys) -> StoredIntrinsics:
 def read_opencv(path: Path, keys: Keys) -> StoredCalibration | None:
     """One camera of OpenCV's FileStorage, or a pair as `cv2.stereoCalibrate` returns it, with T in millimetres.
 
-    Raises:  InputError for a pair without R or T.
+    Raises:  InputError for a pair without R or T, and for a matrix or a distortion under two names.
     """
-    size, notes = opencv_size(keys), ()
-    if any(name in keys for names in (*ONE, *PAIRS) for name in names[:1]):
-        notes = (*OPENCV.noted(keys, path), *_four_coefficients(keys, path), *_of_matlab(path))
-    for left, left_distortion, right, right_distortion in PAIRS:
-        if left in keys and right in keys:
-            for name in ("R", "T"):
-                if name not in keys:
-                    raise InputError(f"{path}: {name} is missing next to {left} and {right}")
-            return StoredCalibration(
-                _opencv_camera(path, keys, left, left_distortion, size),
-                _opencv_camera(path, keys, right, right_distortion, size),
-                matrix(keys["R"], f"{path}: R", (3, 3)),
-                matrix(keys["T"], f"{path}: T", (3,)),
-                notes=notes,
-            )
-    one = next((names for names in ONE if names[0] in keys), None)
-    return StoredCalibration(_opencv_camera(path, keys, *one, size), notes=notes) if one else None
+    if not CAMERA_NAMES & set(keys):
+        return None
+    size = opencv_size(keys, path)
+    notes = (*OPENCV.noted(keys, path), *_four_coefficients(keys, path), *_of_matlab(path))
+    if pair := next((names for names in PAIRS if set(names) <= set(keys)), None):
+        for name in ("R", "T"):
+            if name not in keys:
+                raise InputError(f"{path}: {name} is missing next to {' and '.join(pair)}")
+        bent = next((names for names in PAIR_DISTORTIONS if set(names) & set(keys)), ("", ""))
+        return StoredCalibration(
+            *(_opencv_camera(path, keys, name, other, size) for name, other in zip(pair, bent)),
+            matrix(keys["R"], f"{path}: R", (3, 3)),
+            matrix(keys["T"], f"{path}: T", (3,)),
+            notes=notes,
+        )
+    one = one_name(keys, MATRICES, path)
+    if not one:
+        return None
+    return StoredCalibration(_opencv_camera(path, keys, one, one_name(keys, DISTORTIONS, path), size), notes=notes)
+
+
+def one_name(keys: Keys, names: tuple[str, ...], path: Path) -> str:
+    """The one of these names that a file has; empty if it has none. Raises InputError for two with other values."""
+    found = [name for name in names if name in keys]
+    if any(keys[name] != keys[found[0]] for name in found):
+        raise InputError(f"{path}: {' and '.join(found)} differ; use one of them")
+    return found[0] if found else ""
 
 
 def _opencv_camera(
@@ -307,9 +319,9 @@ def _opencv_camera(
 
 def _four_coefficients(keys: Keys, path: Path) -> list[str]:
     """A note on four coefficients, which OpenCV's fisheye model has too, stored under the same names."""
-    stored = [keys.get(name) for names in (*ONE, *PAIRS) for name in names[1::2]]
-    values = [value.get("data") if isinstance(value, dict) else value for value in stored]
-    if not any(isinstance(value, list) and len(value) == 4 and any(value) for value in values):
+    stored = [keys.get(name) for name in (*DISTORTIONS, *(name for names in PAIR_DISTORTIONS for name in names))]
+    values = [np.ravel(value.get("data") if isinstance(value, dict) else value) for value in stored if value]
+    if not any(len(value) == 4 and value.any() for value in values):
         return []
     return [f"{path.name}: 4 coefficients are read as k1 k2 p1 p2; those of a fisheye model, stored alike, are not"]
 
@@ -321,11 +333,15 @@ def _of_matlab(path: Path) -> list[str]:
     return [f"{path.name}: its camera matrix is read in OpenCV's coordinates; those of MATLAB's classes are 1 larger"]
 
 
-def opencv_size(keys: Keys) -> tuple[int, int] | None:
-    for width, height in SIZES:
-        if isinstance(keys.get(width), int) and isinstance(keys.get(height), int) and keys[width] > 0 < keys[height]:
-            return keys[width], keys[height]
-    return None
+def opencv_size(keys: Keys, path: Path, names: tuple[tuple[str, str], ...] = SIZES) -> tuple[int, int] | None:
+    """Width and height, if the file has both. Raises InputError unless they are whole numbers > 0."""
+    found = next((both for both in names if set(both) <= set(keys)), None)
+    if found is None:
+        return None
+    width, height = (number(keys[name], f"{path}: {name}", 1) for name in found)
+    if width % 1 or height % 1:
+        raise InputError(f"{path}: {' and '.join(found)}: use whole numbers > 0")
+    return int(width), int(height)
 
 
 FORMATS = (  # in the order in which they are tried
@@ -333,5 +349,8 @@ FORMATS = (  # in the order in which they are tried
     Format("FILE.txt or .csv with a camera matrix K of 3x3 numbers, and a baseline in metres", read_matrix_text),
     Format("camchain.yaml of Kalibr (pinhole, radtan), metres", read_kalibr),
     Format("camera_info of ROS, FILE.yaml or a folder with left.yaml and right.yaml, metres", read_ros),
-    Format("FILE.yaml, .xml or .json of OpenCV (camera_matrix, or M1 D1 M2 D2 R T in millimetres)", read_opencv),
+    Format(
+        "FILE.yaml, .xml, .json or .npz of OpenCV (camera_matrix or mtx, or M1 D1 M2 D2 R T in millimetres)",
+        read_opencv,
+    ),
 )

@@ -11,17 +11,23 @@ import numpy as np
 from endotsr.clips.formats.calibration_formats import FORMATS as GENERAL
 from endotsr.clips.formats.calibration_formats import StoredCalibration, StoredIntrinsics
 from endotsr.clips.formats.camera import Intrinsics, StereoCalibration, checked_rotation, intrinsics_of_matrix
+from endotsr.clips.formats.conversions import calibration_conversion
+from endotsr.clips.formats.files import shortened
 from endotsr.clips.formats.matlab_calibrations import FORMATS as MATLAB
 from endotsr.clips.formats.matlab_calibrations import matlab_keys
+from endotsr.clips.formats.plain_calibrations import FORMATS as PLAIN
+from endotsr.clips.formats.plain_calibrations import numpy_keys
 from endotsr.clips.formats.projections import FORMATS as PROJECTIONS
 from endotsr.clips.formats.slam_calibrations import FORMATS as SLAM
 from endotsr.errors import InputError
 from endotsr.untrusted.json import read_json
+from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.storage import read_storage
 from endotsr.untrusted.yaml import read_yaml
 
-FORMATS = (GENERAL[0], *SLAM, *PROJECTIONS, *MATLAB, *GENERAL[1:])  # in the order in which they are tried
-READERS = {".yaml": read_yaml, ".yml": read_yaml, ".json": read_json, ".xml": read_storage, ".mat": matlab_keys}
+FORMATS = (GENERAL[0], *SLAM, *PROJECTIONS, *MATLAB, *GENERAL[1:], *PLAIN)  # in the order in which they are tried
+READERS = {".yaml": read_yaml, ".yml": read_yaml, ".json": read_json, ".xml": read_storage, ".mat": matlab_keys,
+           ".npz": numpy_keys, ".npy": numpy_keys}  # fmt: skip
 
 
 def read_calibration(path: Path) -> StoredCalibration:
@@ -38,7 +44,8 @@ def read_calibration(path: Path) -> StoredCalibration:
         if found is not None:
             return found
     known = "; ".join(entry.about for entry in FORMATS)
-    raise InputError(f"{path}: no calibration that is known here; use {known}")
+    held = f": it holds {shortened([plain_line(name)[:60] for name in keys])}" if keys else calibration_conversion(path)
+    raise InputError(f"{path}: no calibration that is known here{held}; use {known}")
 
 
 SAME_SHAPE = 0.02  # relative difference of proportions

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.conversions import stack_conversion
 from endotsr.errors import InputError
 from endotsr.untrusted.arrays import RefusedArray, open_npz, read_npy
 from endotsr.untrusted.files import open_regular
@@ -68,8 +69,12 @@ def _array(path: Path, changed: int, size: int, kinds: str) -> NDArray:
             raise InputError(f"{path}: {error}; {ONE}") from None
     planes = {name: np.squeeze(array) for name, array in arrays.items() if array.dtype.kind in kinds}
     planes = {name: array for name, array in planes.items() if array.ndim in (2, 3) and min(array.shape) > 3}
-    if path.suffix.lower() == MATLAB and any(array.ndim == 3 for array in planes.values()):
-        raise InputError(f"{path}: holds an array of several frames; use one file of (height, width) per frame")
+    several = next((name for name, array in planes.items() if array.ndim == 3), None)
+    if path.suffix.lower() == MATLAB and several is not None:
+        raise InputError(
+            f"{path}: holds an array of several frames; use one file of (height, width) per frame, or in Python:"
+            f" `{stack_conversion(path, several)}` if its last axis is that of the frames"
+        )
     if len(planes) != 1:
         held = ", ".join(f"{name} {array.shape}" for name, array in arrays.items()) or "nothing"
         raise InputError(f"{path}: holds {held}; {ONE}")

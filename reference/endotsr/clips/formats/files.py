@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
+from endotsr.clips.formats.conversions import conversion
 from endotsr.errors import InputError
 from endotsr.untrusted.files import open_regular
 from endotsr.untrusted.names import counted, file_name, plain_line
@@ -49,9 +50,8 @@ def _what_else(folder: Path) -> str:
     endings = Counter(file.suffix.lower() for file in seen)
     if endings:
         ending, count = endings.most_common(1)[0]
-        return f"; it holds {counted(count, 'file')} " + (
-            f"of the ending {plain_line(ending)}" if ending else "without an ending"
-        )
+        kind = f"of the ending {plain_line(ending)}" if ending else "without an ending"
+        return f"; it holds {counted(count, 'file')} {kind}{conversion(folder, ending)}"
     hidden = f"; it holds {counted(len(entries), 'file')} whose name begins with a dot, as hidden files do: rename them"
     return hidden if entries else "; it is empty"
 

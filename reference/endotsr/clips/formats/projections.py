@@ -9,9 +9,8 @@ import numpy as np
 
 from endotsr.clips.formats.calibration_fields import OPENCV
 from endotsr.clips.formats.calibration_formats import (
+    CAMERA_NAMES,
     LARGEST_MATRIX,
-    ONE,
-    PAIRS,
     Format,
     StoredCalibration,
     StoredIntrinsics,
@@ -54,13 +53,12 @@ def read_projections(path: Path, keys: Keys) -> StoredCalibration | None:
 
     Raises:  InputError as `rectified_baseline`.
     """
-    cameras = {name for names in (*ONE, *PAIRS) for name in names if not name.lower().startswith("d")}
-    if not {"P1", "P2"} <= set(keys) or cameras & set(keys):
+    if not {"P1", "P2"} <= set(keys) or CAMERA_NAMES & set(keys):
         return None
     left, right = (matrix(keys[name], f"{path}: {name}", (3, 4)) for name in ("P1", "P2"))
     baseline = rectified_baseline(left, right, f"{path}: P1 and P2")
     note = f"{path.name}: P1 and P2 are read as a rectified pair, baseline {baseline:g} mm (--baseline overrides it)"
-    found = StoredIntrinsics(left[:, :3].copy(), size=opencv_size(keys))
+    found = StoredIntrinsics(left[:, :3].copy(), size=opencv_size(keys, path))
     return StoredCalibration(found, baseline=baseline, notes=(note, *OPENCV.noted(keys, path)))
 
 

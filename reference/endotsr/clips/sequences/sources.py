@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.formats.calibrations import StatedCamera, calibrated
 from endotsr.clips.formats.camera import ARBITRARY, Intrinsics, checked_intrinsics, intrinsics_of_view, scene_factor
+from endotsr.clips.formats.conversions import conversion
 from endotsr.clips.formats.depth_stacks import ENDINGS as ARRAY_ENDINGS
 from endotsr.clips.formats.depth_stacks import stack_planes
 from endotsr.clips.formats.files import list_pictures
@@ -41,7 +42,8 @@ def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
     """The file itself, or the files of a folder in time order. Raises InputError."""
     if path.is_file():
         if path.suffix.lower() not in endings:
-            raise InputError(f"{path}: use a file that ends in {choice(endings)}, or a folder of such files")
+            allowed = f"use a file that ends in {choice(endings)}, or a folder of such files"
+            raise InputError(f"{path}: {allowed}{conversion(path)}")
         return [path]
     return list_pictures(path, endings)
 

@@ -4,6 +4,7 @@ Trajectories of ROS, spreadsheets and photogrammetry, masks of networks in other
 """
 
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from builders import builder
 from depth_folders import true_depth
 from input_kinds import (
     Row,
+    centred,
     depth,
     depth_files,
     depth_is_true,
@@ -26,7 +28,9 @@ from input_kinds import (
 )
 from made_videos import HEIGHT, WIDTH, files, picture, pictures
 from PIL import Image
+from scipy.io import savemat
 
+from endotsr.clips.formats.conversions import LOADS as LINES
 from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
@@ -79,10 +83,38 @@ def mask_files(folder: Path, save, ending: str) -> list[str]:
 
 
 @builder
+def depth_file(folder: Path, name: str, save) -> list[str]:
+    """All depth in one file."""
+    save(folder / name)
+    return [*folder_of(pictures())(folder), "--depth", str(folder / name)]
+
+
+@builder
 def mask_file(folder: Path, name: str, save) -> list[str]:
     """All masks in one file."""
     save(folder / name)
     return [*folder_of(pictures())(folder), "--masks", str(folder / name)]
+
+
+@builder
+def calibration_file(folder: Path, name: str, save) -> list[str]:
+    """Pictures with a calibration that `save` writes."""
+    save(folder / name)
+    files(folder, "clip", pictures())
+    return prepare("clip", "--calibration", str(folder / name), camera=())(folder)
+
+
+def arrays(**named):
+    return lambda path: np.savez(path, **named)
+
+
+def plain(**named):
+    return lambda path: path.write_text(json.dumps({"fx": 100, "fy": 101, "cx": 63.5, "cy": 47.5} | named))
+
+
+def undistorted(folder: Path) -> bool:
+    """A distortion was applied: the written focal length is another one."""
+    return abs(read_sequence_file(folder / "o").camera.fx - 100) > 1
 
 
 def by_object(folder: Path) -> list[str]:
@@ -126,7 +158,49 @@ def depth_is_true_inside(folder: Path) -> bool:
     return bool(np.abs(found - true_depth(2))[4:, 4:].max() < 0.03 and not found[:4].any() and not found[:, :4].any())
 
 
+MATRIX = np.array([[100.0, 0, 63.5], [0, 101, 47.5], [0, 0, 1]])
+BENT = np.array([[-0.2, 0.05, 1e-3, -2e-3, 0.01]])
+LOADS = {ending: load for ending, (_, load) in LINES.items()}
+SIZE = {"width": WIDTH, "height": HEIGHT}
 BROUGHT_ROWS = [
+    Row("calibration, npz of OpenCV's tutorial", calibration_file("c.npz", arrays(ret=0.3, mtx=MATRIX, dist=0 * BENT,
+        rvecs=np.zeros((3, 3, 1)), tvecs=np.zeros((3, 3, 1)))), "told", "half a pixel was added", centred),
+    Row("calibration, npz with distortion", calibration_file("c.npz", arrays(camera_matrix=MATRIX, dist_coeffs=BENT)),
+        "told", "undistorted: distortion -0.2", undistorted),
+    Row("calibration, npy of a matrix", calibration_file("K.npy", lambda path: np.save(path, MATRIX)), "told",
+        "half a pixel was added", centred),
+    Row("calibration, npz with two matrices", calibration_file("c.npz", arrays(K=MATRIX, mtx=2 * MATRIX)), "refused",
+        "K and mtx differ; use one of them"),
+    Row("calibration, npz with the name of a fisheye model", calibration_file("c.npz", arrays(K=MATRIX,
+        model=np.array("fisheye"))), "refused", "another camera model is not supported"),
+    Row("calibration, npz with other names", calibration_file("c.npz", arrays(a=MATRIX)), "refused",
+        "it holds a; use"),
+    Row("calibration, pickle", calibration_file("c.pkl", lambda path: path.write_bytes(pickle.dumps((MATRIX, BENT)))),
+        "refused", "numpy.savez(f + '.npz', mtx=..., dist=...)"),
+    Row("calibration, JSON with K and D of two tools", calibration_file("c.json", lambda path: path.write_text(
+        json.dumps({"camera_matrix": MATRIX.tolist(), "D": BENT.tolist()}))), "told", "undistorted: distortion -0.2",
+        undistorted),
+    Row("calibration, flat JSON", calibration_file("c.json", plain(**SIZE)), "told", "half a pixel was added", centred),
+    Row("calibration, flat JSON with distortion", calibration_file("c.json", plain(k1=-0.2, k2=0.05)), "told",
+        "undistorted: distortion -0.2, 0.05", undistorted),
+    Row("calibration, flat JSON of another size", calibration_file("c.json", plain(width=96, height=96)), "refused",
+        "the calibration is of 96x96"),
+    Row("calibration, flat JSON of twice the size", calibration_file("c.json", plain(w=2 * WIDTH, h=2.0 * HEIGHT)),
+        "told", "scaled to the 128x96", lambda folder: read_sequence_file(folder / "o").camera.fx == 50),
+    Row("calibration, flat JSON, a size in words", calibration_file("c.json", plain(width="128", height=96)), "refused",
+        "width: '128' is not allowed"),
+    Row("calibration, flat JSON of a RealSense", calibration_file("c.json", lambda path: path.write_text(json.dumps(
+        {"fx": 100, "fy": 101, "ppx": 64, "ppy": 48}))), "refused", "cx, cy missing; use fx, fy, cx, cy"),
+    Row("calibration, flat JSON, fisheye", calibration_file("c.json", plain(k1=0.1, k2=0.1, k3=0.1, k4=0.1)), "refused",
+        "k4 without p1 and p2"),
+    *(Row(f"masks, {ending[1:]} of each frame", mask_files(lambda path, plane: path.write_bytes(b"x"), ending),
+        "refused", load) for ending, load in LOADS.items()),
+    *(Row(f"masks, one {ending[1:]} of all frames", mask_file(f"m{ending}", lambda path: path.write_bytes(b"x")),
+        "refused", load) for ending, load in LOADS.items()),
+    Row("depth, pt of each frame", depth_files(lambda path, plane: path.write_bytes(b"x"), ".pt"), "refused",
+        'torch.load(f, "cpu", weights_only=True)'),
+    Row("depth, mat of all frames", depth_file("d.mat", lambda path: savemat(path, {"z": np.ones((96, 128, 6))})),
+        "refused", '["z"], 2, 0))` if its last axis is that of the frames'),
     Row("trajectory, rostopic echo -p", trajectory(ROS), "told", "by the head line", moved),
     Row("trajectory, cells in quotation marks", trajectory(lines(",", quote='"')), "told", "x y z w", moved),
     Row("trajectory, a comment behind each line", trajectory(lines("\t", end="  # tracked")), "told", "x y z w", moved),

@@ -179,6 +179,9 @@ PAIR_CHANGES = {"M1": {"data": [33.0, 0, 15, 0, 31, 11, 0, 0, 1]}, "D1": {"data"
                 "M2": {"data": [33.0, 0, 15, 0, 31, 11, 0, 0, 1]}, "D2": {"data": [0.2, 0, 0, 0]},
                 "R": {"data": [1.0, 0, 0, 0, 0, -1, 0, 1, 0]}, "T": {"data": [-5.0, 0, 0]}, "image_width": 64,
                 "image_height": 48}  # fmt: skip
+PLAIN = {"fx": 30.0, "fy": 31.0, "cx": 15.0, "cy": 11.0, "width": WIDTH, "height": HEIGHT} | {
+    name: 0.01 for name in ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")}  # fmt: skip
+PLAIN_CHANGES = {name: 2 * value for name, value in PLAIN.items()}
 CHAIN = {"camera_model": "pinhole", "intrinsics": [30, 31, 15, 11], "resolution": [WIDTH, HEIGHT],
          "distortion_model": "radtan", "distortion_coeffs": [0.1, 0.01, 0.0, 0.0],
          "T_cn_cnm1": [[1, 0, 0, -0.004], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}  # fmt: skip
@@ -244,6 +247,8 @@ FORMATS = {
                        {"binning_x": 2, "binning_y": 2, "roi": {"x_offset": 8}}),
     "opencv": Format(calibration_fields.OPENCV, PAIR, write_yaml, stated, PAIR_CHANGES,
                      {"fisheye_model": 1, "xi": 0.9, "model": "fisheye", "skew": 0.1}),
+    "flat": Format(calibration_fields.FLAT, PLAIN, write_yaml, stated, PLAIN_CHANGES,
+                   {"fisheye": True, "model": "kannala_brandt4", "skew": 0.1, "coeffs": [0.1, 0, 0, 0]}),
     "matlab": Format(matlab_calibrations.CAMERA, MAT_CAMERA, write_mat_cameras, stated,
                      MAT_CAMERA_CHANGES,
                      {"Skew": 0.1, "MappingCoefficients": [[800.0, 0, 0, 0]], "StretchMatrix": [[1.0, 0], [0, 1]],

@@ -70,8 +70,8 @@ def test_the_base_has_every_used_field_or_a_change_adds_it(name):
     patterns = [word for names in found.inventory.used for word in names.split()]
     tried = {*found.changed, *found.base}
     spelled = {"nerfstudio frame": {"camera_angle_x", "camera_angle_y"}, "ros": ALIASES, "ros echo": ALIASES,
-               "opencv": OTHER_NAMES, "tiff": BY_LIBTIFF, "bmp": BY_PILLOW, "matlab": {"FocalLength", "PrincipalPoint"},
-               "bouguet": {"fc", "cc", "kc"},
+               "opencv": OTHER_NAMES, "flat": OF_PLAIN_NUMBERS, "tiff": BY_LIBTIFF, "bmp": BY_PILLOW,
+               "matlab": {"FocalLength", "PrincipalPoint"}, "bouguet": {"fc", "cc", "kc"},
                "trajectory": {"rvec_x", "rvec_y", "rvec_z"}, **REPEATED, **OF_FOLDERS}.get(name, set())  # fmt: skip
     for pattern in patterns:
         inventory = Inventory("", {pattern: "x"})
@@ -85,9 +85,13 @@ ALIASES = {"image_width", "width", "image_height", "height", "camera_matrix", "K
 BY_LIBTIFF = {"ColorMap", "SampleFormat", "FillOrder", "TileWidth", "TileLength", "TileOffsets", "TileByteCounts",
               "YCbCrSubSampling", "YCbCrPositioning", "YCbCrCoefficients", "ReferenceBlackWhite", "JPEGTables",
               "T4Options", "T6Options", "GrayResponseUnit", "GrayResponseCurve", "GDAL_NODATA"}  # fmt: skip
+OF_PLAIN_NUMBERS = {"w", "h", "image_width", "image_height", "distortion_coefficients", "Distortion_Coefficients", "D",
+                    "distCoeffs", "dist", "dist_coeffs", "dist_coeff", "distortion"}  # fmt: skip
 OTHER_NAMES = {"camera_matrix", "Camera_Matrix", "K", "cameraMatrix", "distortion_coefficients",
                "Distortion_Coefficients", "D", "distCoeffs", "K1", "K2", "cameraMatrix1", "cameraMatrix2",
-               "distCoeffs1", "distCoeffs2", "image_Width", "image_Height", "width", "height"}  # fmt: skip
+               "distCoeffs1", "distCoeffs2", "image_Width", "image_Height", "width", "height", "mtx", "camera_mtx",
+               "intrinsic_matrix", "dist", "dist_coeffs", "dist_coeff", "distortion", "mtx1", "mtx2", "mtxL", "mtxR",
+               "dist1", "dist2", "distL", "distR"}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["nerfstudio", "nerfstudio frame"])
@@ -99,7 +103,7 @@ def test_a_file_with_a_new_field_says_so(name, tmp_path):
     assert any("unknown here: lens_shading_map" in note for note in describe(tmp_path).notes)
 
 
-@pytest.mark.parametrize("name", ["kalibr", "ros", "ros echo", "opencv", "ini", "matlab pair", "bouguet"])
+@pytest.mark.parametrize("name", ["kalibr", "ros", "ros echo", "opencv", "flat", "ini", "matlab pair", "bouguet"])
 def test_a_calibration_with_a_new_field_says_so(name, tmp_path):
     from endotsr.clips.formats.calibrations import calibrated
 
