@@ -36,6 +36,9 @@ HELP = {"-h", "--help", HELP_ALL}
 THOUSANDS = {"k": 1e3, "K": 1e3, "M": 1e6}
 FROM_END = re.compile(r"-\d*:[-\d:,.s]*|-\d+s?,[-\d:,.s]+")  # frames counted from the end: -5: or -5:-1
 NEGATIVE = re.compile(r"-\d+|-\d*\.\d+")  # numbers of argparse before Python 3.14
+WINDOW = "X Y WIDTH HEIGHT"
+GEOMETRY = re.compile(r"(\d+)x(\d+)\+(\d+)\+(\d+)!?")  # of ImageMagick and X11
+FILTER = re.compile(r"crop=(\d+):(\d+):(\d+):(\d+)")  # of FFmpeg: width, height, x, y
 SWITCH_WORDS = {"true": True, "false": False}  # after a switch, as in a settings file
 
 
@@ -216,7 +219,10 @@ def _refused(field: Field, word: str) -> InputError:
 
 
 def _written_out(field: Field, word: str) -> str:
-    """Advice for numbers as people write them: 1k, 29,97, 4mm, or several with commas; "" for other words."""
+    """Advice for numbers as people write them: 1k, 29,97, 4mm, several with commas, or WxH+X+Y; "" for other words."""
+    if field.metavar == WINDOW and (found := GEOMETRY.fullmatch(word) or FILTER.fullmatch(word)):
+        width, height, x, y = found.groups()
+        return f", as {WINDOW}: {field.name} {x} {y} {width} {height}"
     if field.count != 1 and re.fullmatch(r"[-\d., ;]+[,;][-\d., ;]+", word):
         return f", apart from the others: {field.name} {' '.join(re.split('[,; ]+', word.strip(',; ')))}"
     if found := re.fullmatch(r"(\d+\.?\d*|\.\d+)([kKM])", word):
@@ -226,7 +232,7 @@ def _written_out(field: Field, word: str) -> str:
     elif found := re.fullmatch(r"(-?\d+\.?\d*|-?\.\d+)\s*[^\d\s.,]\D*", word):
         number, advice = found[1], "without a unit"
     else:
-        return ""
+        return f", as {WINDOW}" if field.metavar == WINDOW else ""
     try:
         converted(field.item, number)
     except ValueError:

@@ -123,8 +123,10 @@ SURGEON_ROWS = [
     Row("masks, the folder that endotsr masks wrote", of_the_masks_command, "right", "", half_excluded),
     Row("camera, numbers with commas", folder_of(pictures(), "--camera", "100,100,64,48"), "refused",
         "use a number, apart from the others: --camera 100 100 64 48"),
-    Row("crop as ImageMagick writes it", folder_of(pictures(), "--crop", "100x80+10+10"), "refused",
-        "--crop '100x80+10+10' is not allowed; use an integer"),
+    *(Row(f"crop as {word}", folder_of(pictures(), "--crop", word), "refused", f"--crop '{word}' is not allowed; use an"
+        f" integer, {how}") for word, how in (("100x80+10+12", "as X Y WIDTH HEIGHT: --crop 10 12 100 80"),
+        ("crop=100:80:10:12", "as X Y WIDTH HEIGHT: --crop 10 12 100 80"), ("10:12:100:80", "as X Y WIDTH HEIGHT"),
+        ("10,12,100,80", "apart from the others: --crop 10 12 100 80"))),
     Row("rate with a decimal comma", folder_of(pictures(), "--source-rate", "29,97"), "refused",
         "use a number, with a decimal point (29.97)"),
     Row("baseline with a unit", folder_of(pictures(), "--baseline", "4.2 mm"), "refused",
