@@ -10,6 +10,7 @@ import pytest
 
 from endotsr.config import DensityConfig
 from endotsr.errors import InputError
+from endotsr.method.splatting.covariance import covariance_forward
 from endotsr.training.fitting.adam import adam_state, adam_update, regather
 from endotsr.training.fitting.checkpoint import digest, load_checkpoint, restore_rng, save_checkpoint
 from endotsr.training.scene.density_control import densify, empty_statistics, gather_statistics
@@ -99,6 +100,20 @@ def test_hard_G5_save_load_continue_equals_uninterrupted(tmp_path):
     assert state[0].count > 6
     assert_equal(state, resumed)
     assert rng.random() == generator.random()
+
+
+@pytest.mark.parametrize("value", [41.0, 89.0, 3e38, -1001.0, -3e38])
+def test_a_log_scale_that_is_clipped_where_it_is_used_is_read_and_renders_as_the_clipped_one(value, tmp_path):
+    """B2 clips at 40, so that a training may go on with any log-scale; its checkpoint has to be readable."""
+    gaussians, adam = make()
+    gaussians.log_scale[0, 1] = value
+    save(tmp_path / "checkpoint.npz", gaussians, adam)
+    read = load_checkpoint(tmp_path / "checkpoint.npz").gaussians
+    assert read.log_scale[0, 1] == np.float32(value)
+    clipped = read.log_scale.copy()
+    clipped[0, 1] = np.copysign(40.0, value)
+    shapes = [covariance_forward(read.quaternion, scale)[0].scale for scale in (read.log_scale, clipped)]
+    np.testing.assert_array_equal(*shapes)
 
 
 def rewrite(path, change):

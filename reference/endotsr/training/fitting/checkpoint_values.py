@@ -1,7 +1,7 @@
 """Validation of the numbers of a checkpoint, which may be damaged, edited or forged.
 
-In: the arrays read from the file. Out: nothing, or ValueError with the name of the array and the allowed values. The
-limits are far beyond the states of a training at the learning rates of the presets.
+In: the arrays read from the file. Out: nothing, or ValueError with the name of the array and the allowed values. A
+state of a training passes if its numbers are finite.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,6 @@ from endotsr.training.scene.parameters import CHANNELS, FrameParameters, trained
 
 PRECISIONS = ("float32", "float64")
 HARMONICS = (1, 4, 9, 16)  # (degree + 1)^2
-SMALLEST_LOG_SCALE, LARGEST_LOG_SCALE = -1000.0, 88.0  # exp(88) is still finite in float32
 # The axes before the last: a number is a length, a letter is one unknown length common to all its axes.
 SHAPES: dict[str, tuple[int | str, ...]] = {
     "position": (3,),
@@ -96,8 +95,8 @@ def check_numbers(
 ) -> None:
     """Check the values of arrays that have passed `check_shapes`. Raises ValueError with array and index.
 
-    All are finite. Log-scales are in [-1000, 88], second moments and statistics are nonnegative, and the times of the
-    training frames ascend within [0, 1].
+    All are finite; second moments and statistics are nonnegative, and the times of the training frames ascend within
+    [0, 1]. A log-scale of any size is one of a training: it is clipped where it is used (B2).
     """
     for label, array, low, high in _limits(gaussians, adam, statistics, frames):
         good = (array >= low) & (array <= high)  # NaN is in no range
@@ -115,8 +114,7 @@ def _limits(
     """Name, array, and the range of its values; every range excludes infinity."""
     largest = float(np.finfo(gaussians.position.dtype).max)
     for name, array in (arrays(gaussians) | trained(frames)).items():
-        scale = name == "log_scale"
-        yield name, array, *((SMALLEST_LOG_SCALE, LARGEST_LOG_SCALE) if scale else (-largest, largest))
+        yield name, array, -largest, largest
         yield f"first {name}", adam.first[name], -largest, largest
         yield f"second {name}", adam.second[name], 0.0, largest
     yield "gradient_sum", statistics.gradient_sum, 0.0, float(np.finfo(np.float64).max)
