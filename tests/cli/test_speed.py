@@ -83,13 +83,14 @@ def test_check_says_that_its_minutes_assume_a_speed(kept, tmp_path, capsys):
     assert "training needs about" in (said := capsys.readouterr().out) and "assumed" not in said
 
 
-def test_a_training_of_given_minutes_times_its_iterations_once(tmp_path, capsys, monkeypatch):
-    """It ends before the training."""
+@pytest.mark.parametrize("least", [1, 80_000])
+def test_a_training_of_given_minutes_times_its_iterations_once(least, tmp_path, capsys, monkeypatch):
+    """It ends before the training. Its first line has the timed speed, also of frames below the least size."""
 
     def ended(*_):
         raise InputError("ended")
 
-    monkeypatch.setattr(speed, "LEAST_PIXELS", 1)
+    monkeypatch.setattr(speed, "LEAST_PIXELS", least)
     monkeypatch.setattr(speed, "speed_file", lambda threads: tmp_path / "speed.json")
     monkeypatch.setattr(training, "train_new_run", ended)
     timed = []

@@ -321,7 +321,8 @@ def _progress(
         frames = frames.with_true_motion()
     perceived = lpips_file(options.lpips) is not None if options.evaluate else None
     pixels = sequence.width * sequence.height
-    speed = known_speed(threads, partial(_timed_unit, sequence, config, unit) if pixels >= LEAST_PIXELS else None)
+    timed = partial(_timed_unit, sequence, config, unit) if pixels >= LEAST_PIXELS or unit is not None else None
+    speed = known_speed(threads, timed)
     plan = TimedCommand(config, frames, pixels, threads, perceived, vector_factor(), speed.beside)
     print(waiting_line(plan, speed, done_before(config).exists(), at))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
