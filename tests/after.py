@@ -206,4 +206,6 @@ def main(words: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    from endotsr.cli.parts.closed_pipe import until_closed
+
+    sys.exit(until_closed(lambda: main(sys.argv[1:])))

@@ -218,4 +218,6 @@ def main(root: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT)
+    from endotsr.cli.parts.closed_pipe import until_closed
+
+    sys.exit(until_closed(lambda: main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT)))

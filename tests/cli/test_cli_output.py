@@ -71,6 +71,14 @@ def left_by_its_reader():
 
 
 @pytest.mark.skipif(os.name != "posix", reason="closes the reading end of a pipe")
+@pytest.mark.parametrize("words", [["docs/make.py"], ["tests/house.py"], ["tests/after.py", "HEAD"]], ids=" ".join)
+def test_a_closed_pipe_ends_a_program_of_the_repository_without_a_traceback(words, left_by_its_reader):
+    command = [sys.executable, Path(__file__).parents[2] / words[0], *words[1:]]
+    done = subprocess.run(command, stdout=left_by_its_reader, stderr=subprocess.PIPE, text=True, timeout=300)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes the reading end of a pipe")
 @pytest.mark.parametrize("unbuffered", [{}, {"PYTHONUNBUFFERED": "1"}], ids=["buffered", "unbuffered"])
 def test_a_closed_pipe_ends_a_command_without_a_traceback(unbuffered, left_by_its_reader):
     for words in PRINTS:

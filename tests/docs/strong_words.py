@@ -100,4 +100,6 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    from endotsr.cli.parts.closed_pipe import until_closed
+
+    sys.exit(until_closed(main))

@@ -4,13 +4,13 @@ No heavy imports here: `endotsr --help` starts quickly. Exit codes: 0 success, 1
 input or usage, 130 interrupted (Ctrl-C or SIGTERM), 141 output pipe closed (128 + SIGPIPE, like other programs).
 """
 
-import errno
 import importlib
 import io
 import os
 import sys
 
 from endotsr import __version__
+from endotsr.cli.parts.closed_pipe import CLOSED_PIPE, discard_unwritten, is_closed_pipe
 from endotsr.cli.parts.commands import COMMANDS, FORMER
 from endotsr.cli.parts.output import redirected, split_output
 from endotsr.errors import CalibrationError, InputError
@@ -21,7 +21,6 @@ from endotsr.untrusted.names import choice, plain_line
 # if each had threads of its own; `--threads 1` would not hold either.
 BLAS = ("OPENBLAS_NUM_THREADS", "1")
 OTHER_PROGRAMS = "close other programs"
-CLOSED_PIPE = 141
 LESS_MEMORY = {  # advice by command; the other commands get OTHER_PROGRAMS
     "train": "a smaller --scale, fewer --frames or a smaller --density.maximum needs less; with --resume, "
     + OTHER_PROGRAMS,
@@ -47,7 +46,7 @@ def _leave(code: int) -> None:
     An interruption leaves threads in OpenCV, for example in a flow. Python ends them when they return to it, and the
     C++ runtime then aborts the process, with exit code 134 and a line of its own.
     """
-    _discard_unwritten()
+    discard_unwritten()
     os._exit(code)
 
 
@@ -112,30 +111,13 @@ def _answered(words: list[str]) -> bool:
 
 def _system_error(error: OSError) -> int:
     """The exit code after an error of the system. A closed pipe, as of `endotsr ... | head`, has no message."""
-    closed = _is_closed_pipe(error)
+    closed = is_closed_pipe(error)
     if not closed:
         from endotsr.training.runs.files import os_error_line
 
         _fail(os_error_line(error))
-    _discard_unwritten()
+    discard_unwritten()
     return CLOSED_PIPE if closed else 2
-
-
-def _discard_unwritten() -> None:
-    """Drop the text that a closed pipe or a full disk does not take, so that the exit does not try it once more."""
-    for stream in filter(None, (sys.__stdout__, sys.__stderr__)):  # None without a console
-        try:
-            stream.flush()
-        except OSError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-        except ValueError:  # the program that called `main` has closed or detached the stream
-            pass
-
-
-def _is_closed_pipe(error: OSError) -> bool:
-    """Whether an output pipe was closed. On Windows such a write is an invalid argument without a file name."""
-    invalid = os.name == "nt" and error.errno == errno.EINVAL and error.filename is None
-    return isinstance(error, BrokenPipeError) or invalid
 
 
 def _command(name: str):
@@ -169,7 +151,7 @@ def _complain(line: str) -> None:
     try:
         print(line, file=sys.stderr, flush=True)
     except OSError:
-        _discard_unwritten()
+        discard_unwritten()
 
 
 def _overview() -> str:
