@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
-from tiny import SETTINGS, assert_refused, run_line, train_words, written_folder
+from tiny import SETTINGS, assert_refused, run_line, scene, train_words, written_folder
 
 from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.record import SequenceRecord, recorded
@@ -119,6 +119,17 @@ def test_a_clip_or_a_part_of_a_run_in_place_of_a_run_names_what_to_use(folder, f
     (tmp_path / "runs").mkdir()
     shutil.copytree(finished_run, tmp_path / "runs/mine")
     assert_refused(capsys, ["evaluate", str(tmp_path / "runs")], "use one of those in it: mine")
+
+
+def test_a_run_in_place_of_a_clip_is_named_with_its_clip(finished_run, tmp_path, capsys):
+    """Its folder holds a picture of curves, which is no frame."""
+    assert list(finished_run.glob("*.png"))
+    said = f"a run folder, not a clip; it was trained on {scene()}"
+    for words in (["prepare", "--camera", "50", "50", "24", "16"], ["train"], ["masks"]):
+        assert_refused(capsys, [words[0], str(finished_run), "--out", str(tmp_path / "o"), *words[1:]], said)
+    for name in ("check", "inspect"):
+        assert_refused(capsys, [name, str(finished_run)], said)
+    assert not (tmp_path / "o").exists()
 
 
 def test_resume_of_nothing(tmp_path, capsys):

@@ -11,6 +11,7 @@ from endotsr.clips.formats.files import shortened
 from endotsr.clips.formats.video_file import LARGEST_FILE, VIDEO_ENDINGS
 from endotsr.errors import InputError
 from endotsr.untrusted.files import open_regular
+from endotsr.untrusted.json import read_json
 from endotsr.untrusted.names import counted, plain_line
 
 ARCHIVES = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz", ".zst")
@@ -56,8 +57,26 @@ def _of_file(path: Path) -> str:
     return ": a video in a format that is not read; convert it to mp4" if ending in OTHER_VIDEOS else ""
 
 
+def is_run(path: Path) -> bool:
+    """Whether a folder is that of a training or of one with windows, whose pictures are results."""
+    of_one = all((path / name).is_file() for name in ("config.toml", "run.json", "sequence.json"))
+    return of_one or (path / "windows.json").is_file()
+
+
+def _of_run(path: Path) -> str:
+    """What is said of a run folder in place of a clip."""
+    try:
+        source = read_json(path / "run.json").get("input", {}).get("source")
+    except (InputError, AttributeError):  # of damaged records, and of a run with windows
+        source = None
+    of = f"; it was trained on {plain_line(source)}" if isinstance(source, str) else ""
+    return f": a run folder, not a clip{of}"
+
+
 def _of_folder(path: Path) -> str:
-    """The most frequent ending decides, then videos, then inner folders."""
+    """A run is named; then the most frequent ending decides, then videos, then inner folders."""
+    if is_run(path):
+        return _of_run(path)
     dicom = sum(is_dicom(file) for file in path.iterdir() if file.suffix.lower() in DICOM_ENDINGS)
     if dicom:
         return f": it holds {counted(dicom, 'DICOM file')}; {EXPORT_DICOM}"

@@ -32,6 +32,7 @@ from endotsr.clips.sequences.sources import (
 )
 from endotsr.clips.sequences.stored_pairs import squeezed_note, view_size
 from endotsr.clips.sequences.times import usual_rate
+from endotsr.clips.sequences.unknown_source import is_run
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 
@@ -45,7 +46,11 @@ def recognises(path: Path) -> bool:
     """Whether a path is a picture, or a folder with pictures directly or in a known pair of folders."""
     if path.is_file():
         return path.suffix.lower() in PICTURE_ENDINGS
-    return path.is_dir() and any(_holds_pictures(folder) for folder in (path, *(path / left for left, _ in PAIRS)))
+    return (
+        path.is_dir()
+        and not is_run(path)
+        and any(_holds_pictures(folder) for folder in (path, *(path / left for left, _ in PAIRS)))
+    )
 
 
 def _holds_pictures(folder: Path) -> bool:
