@@ -18,7 +18,7 @@
                                 values of the depth, depth interpolated across holes, and numbers that did not fit
     depth_steps, flips          depth against the motion and the light of the pictures
     depth_pair, stereo          depth against stereo pairs, and the two views of a pair
-    late                        masks and depth of other moments than their pictures
+    late, displaced             masks and depth of other moments than their pictures; depth beside its masks
     cameras, agreement          poses and calibration, and whether the poses explain the pictures
     split_tissue                tissue on both sides of the split
 

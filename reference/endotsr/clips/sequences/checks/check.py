@@ -107,7 +107,8 @@ def _of_masks(run: FramePass) -> list[Finding]:
         return []
     where = str(masks.files[0].parent)
     priors = depth.files[0].parent if depth and depth.files else run.clip.where
-    return [*run.masks.findings(where), *run.specks.findings(where), *run.late.findings(where, str(priors))]
+    apart = run.late.findings(where, str(priors)) or run.displaced.findings(str(priors))
+    return [*run.masks.findings(where), *run.specks.findings(where), *apart]
 
 
 def _of_depth(run: FramePass, config: Config) -> list[Finding]:

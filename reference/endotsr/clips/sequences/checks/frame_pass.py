@@ -18,6 +18,7 @@ from endotsr.clips.sequences.checks.colour_planes import ColourPlanes
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_facts, light_correlation
 from endotsr.clips.sequences.checks.depth_pair import DepthPairs
 from endotsr.clips.sequences.checks.depth_steps import DepthSteps
+from endotsr.clips.sequences.checks.displaced import DisplacedDepth
 from endotsr.clips.sequences.checks.flips import DepthTurns, Fit, pair_finding, shading_fit
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts
 from endotsr.clips.sequences.checks.kinds import Finding, finding, tried
@@ -66,7 +67,7 @@ class FramePass:
         self.frames: list[FrameFacts] = []
         self.masks, self.specks = MaskSteps(), Specks()
         self.view, self.late, self.still = FieldOfView(), LateParts(), StillParts(count)
-        self.planes = ColourPlanes(count)
+        self.planes, self.displaced = ColourPlanes(count), DisplacedDepth(count)
         self.depth: list[DepthFacts] = []
         self.steps, self.turns, self.of_split = DepthSteps(count), DepthTurns(), SplitTissue(count)
         self.views, self.against = PairViews(count), DepthPairs(clip)
@@ -108,6 +109,7 @@ class FramePass:
         self.steps.add(i, picture, depth, tissue)
         self.late.add(picture, tissue, depth)
         self.turns.add(i, depth)
+        self.displaced.add(i, tissue, depth)
         self.of_split.add(i, tissue, depth)
 
     def _sized(self, make: Callable[[], NDArray], code: str, file: Path, i: int) -> NDArray | None:

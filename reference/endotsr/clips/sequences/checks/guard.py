@@ -15,6 +15,7 @@ from endotsr.clips.sequences.checks.colour_planes import loaded_plane_findings
 from endotsr.clips.sequences.checks.dark_border import loaded_border_findings
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_findings, usual_depth
 from endotsr.clips.sequences.checks.depth_steps import loaded_steps
+from endotsr.clips.sequences.checks.displaced import loaded_displaced_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.clips.sequences.checks.kinds import Finding, worst_first
 from endotsr.clips.sequences.checks.late import loaded_late_findings
@@ -50,7 +51,8 @@ def guarded(
     if clip.masks and clip.masks.files:
         found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
         found += loaded_mask_findings(sequence, str(clip.masks.files[0].parent))
-        found += loaded_late_findings(sequence, str(clip.masks.files[0].parent), str(clip.depth.files[0].parent))
+        folders = str(clip.masks.files[0].parent), str(clip.depth.files[0].parent)
+        found += loaded_late_findings(sequence, *folders) or loaded_displaced_findings(sequence, folders[1])
     found += loaded_split_findings(sequence, folder)
     priors = str(clip.depth.files[0].parent)
     found += depth_findings(depth, priors, clip.arbitrary, near, clip.depth.assumed)

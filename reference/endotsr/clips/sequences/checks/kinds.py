@@ -235,6 +235,9 @@ KINDS: dict[str, Kind] = {
                                " the optical axis, without an offset; or endotsr depth CLIP --replace"),
     "late-depth": Kind("warning", "the tissue that moves gets the depth of another moment",
                        "give each file of depth the number of its picture"),
+    "displaced-depth": Kind("warning", "the tissue gets the depth of what lies beside it",
+                            "cut depth, masks and pictures to one window and one size, or move the depth by these"
+                            " pixels"),
     "flipped-depth": Kind("warning", "the depth does not match the tissue in the picture",
                           "store its first row at the top and its first column at the left, like the picture"),
     # cameras

@@ -11,6 +11,7 @@ from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.depth import rim_finding
 from endotsr.clips.sequences.checks.depth_rims import blended_rim
 from endotsr.clips.sequences.checks.depth_steps import DepthSteps
+from endotsr.clips.sequences.checks.displaced import DisplacedDepth
 from endotsr.clips.sequences.checks.exchanged import MaskOrder
 from endotsr.clips.sequences.checks.flips import DepthTurns
 from endotsr.clips.sequences.checks.guard import notes_of
@@ -37,7 +38,7 @@ class WrittenFrames:
         self.still, self.planes, self.frames = StillParts(count), ColourPlanes(count), 0
         self.blended: list[float] = []
         self.order, self.turns, self.held, self.late = MaskOrder(), MaskTurns(), HeldMasks(), LateParts()
-        self.specks, self.pairs = Specks(), PairViews(count)
+        self.specks, self.pairs, self.displaced = Specks(), PairViews(count), DisplacedDepth(count)
         self.depths = DepthTurns(), DepthSteps(count)
 
     def add(self, pair: PicturePair, tissue: BoolArray | None, depth: NDArray[np.float32] | None) -> None:
@@ -55,6 +56,7 @@ class WrittenFrames:
         self.turns.add(tissue)
         self.held.add(tissue)
         self.late.add(picture, tissue, depth)
+        self.displaced.add(self.frames - 1, tissue, depth)
         if tissue is not None:
             self.masks.add(picture, tissue, depth)
         if depth is not None and depth.any():
@@ -73,7 +75,7 @@ class WrittenFrames:
             notes += notes_of(against) or [self.masks.note(excluded)]
             parts = self.turns, self.order, self.held, self.specks
             notes += notes_of([found for part in parts for found in part.findings(where)])
-            notes += notes_of(self.late.findings(where, where))
+            notes += notes_of(self.late.findings(where, where) or self.displaced.findings(where))
             notes += notes_of(border_findings(self.view, where)) if border == "auto" else []
         notes += notes_of([found for part in self.depths for found in part.findings(where)])
         notes += notes_of(self.pairs.findings([Path(where) / name for name in clip.names]))
