@@ -124,6 +124,8 @@ REFUSED = {
     "6 distortion coefficients": ("a.yaml", ros(K, [0.1] * 6)),
     "resolution": ("a.yaml", kalibr(resolution=[128.5, 96])),
     "use 3x3 finite numbers": ("a.yaml", "camera_matrix: [1, 2]"),
+    "D: use n finite numbers": ("a.yaml", "K: [1,0,0,0,1,0,0,0,1]\nD: [[1, 2], [3]]"),
+    "dist: use n finite numbers": ("a.yaml", "mtx: [1,0,0,0,1,0,0,0,1]\ndist: {rows: 1}"),
     "R is missing": ("a.yaml", "M1: [1,0,0,0,1,0,0,0,1]\nM2: [1,0,0,0,1,0,0,0,1]"),
     "could not determine a constructor": ("a.yaml", "camera_matrix: !!python/object/apply:os.getcwd []"),
     "4 words": ("a.txt", "1 2 3 4"),

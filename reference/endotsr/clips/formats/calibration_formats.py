@@ -290,7 +290,8 @@ def read_opencv(path: Path, keys: Keys) -> StoredCalibration | None:
                 raise InputError(f"{path}: {name} is missing next to {' and '.join(pair)}")
         bent = next((names for names in PAIR_DISTORTIONS if set(names) & set(keys)), ("", ""))
         return StoredCalibration(
-            *(_opencv_camera(path, keys, name, other, size) for name, other in zip(pair, bent)),
+            _opencv_camera(path, keys, pair[0], bent[0], size),
+            _opencv_camera(path, keys, pair[1], bent[1], size),
             matrix(keys["R"], f"{path}: R", (3, 3)),
             matrix(keys["T"], f"{path}: T", (3,)),
             notes=notes,
@@ -319,9 +320,9 @@ def _opencv_camera(
 
 def _four_coefficients(keys: Keys, path: Path) -> list[str]:
     """A note on four coefficients, which OpenCV's fisheye model has too, stored under the same names."""
-    stored = [keys.get(name) for name in (*DISTORTIONS, *(name for names in PAIR_DISTORTIONS for name in names))]
-    values = [np.ravel(value.get("data") if isinstance(value, dict) else value) for value in stored if value]
-    if not any(len(value) == 4 and value.any() for value in values):
+    names = (*DISTORTIONS, *(name for both in PAIR_DISTORTIONS for name in both))
+    given = [matrix(keys[name], f"{path}: {name}", (-1,)) for name in names if keys.get(name)]
+    if not any(found.size == 4 and found.any() for found in given):
         return []
     return [f"{path.name}: 4 coefficients are read as k1 k2 p1 p2; those of a fisheye model, stored alike, are not"]
 
