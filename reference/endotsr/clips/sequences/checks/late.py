@@ -65,7 +65,7 @@ class LateParts:
         if len(self._tissue) < 2 * FARTHEST + FEWEST:
             return []
         tissue, colours = np.stack(self._tissue), np.stack(self._colours)
-        found = masks_of_other_moments(colours, tissue, masks)
+        found = masks_of_other_frames(colours, tissue, masks)
         return found or (late_depth(np.stack(self._known), tissue, depth) if len(self._known) == len(tissue) else [])
 
 
@@ -77,7 +77,7 @@ def loaded_late_findings(sequence: Sequence, masks: str, depth: str) -> list[Fin
     return parts.findings(masks, depth)
 
 
-def masks_of_other_moments(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list[Finding]:
+def masks_of_other_frames(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list[Finding]:
     """A warning on masks that fit the pictures of other frames better: moved by some frames, or the last one first.
 
     colours   (n, h, w) numbers of quantised colours
@@ -99,7 +99,7 @@ def _moved(tissue: BoolArray) -> dict[int, BoolArray]:
 
 
 def late_masks(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list[Finding]:
-    """A warning on masks that fit the pictures some frames before or after better; see `masks_of_other_moments`."""
+    """A warning on masks that fit the pictures some frames before or after better; see `masks_of_other_frames`."""
     middle = slice(FARTHEST, len(tissue) - FARTHEST)
     moved = _moved(tissue)
     known = {k: mutual_information(colours[middle], moved[k]) for k in SHIFTS}
@@ -119,7 +119,7 @@ def late_masks(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list
 
 
 def reversed_masks(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list[Finding]:
-    """A warning on masks that fit the pictures better from the last to the first; see `masks_of_other_moments`."""
+    """A warning on masks that fit the pictures better from the last to the first; see `masks_of_other_frames`."""
     known, turned = (mutual_information(colours, masks) for masks in (tissue, tissue[::-1]))
     if turned < max(known + INFORMED, TIMES * known):
         return []
