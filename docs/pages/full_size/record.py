@@ -16,6 +16,7 @@ import numpy as np
 from endotsr.results.evaluation.evaluate import EVERY_BASELINE
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
+from endotsr.untrusted.names import counted as counted_of
 from pages.full_size.interpolation import LEFT_OUT, frames_text, tissue_only
 from pages.store.commands import loaded
 from pages.store.intervals import interval
@@ -160,7 +161,7 @@ def about(name: str, metrics: dict) -> str:
         f"split `{settings['sequence']['split']}`, {run['iteration']} iterations, seed {run['seed']}, "
         f"{run['gaussians']} Gaussians at the end, training PSNR {training['psnr_full']:.2f} dB, "
         f"lambda_lap {run['lambda_lap']:.3g}, {run['seconds'] / 60:.0f} minutes and "
-        f"{run['peak_memory_bytes'] / 1e9:.2f} GB on {run['threads']} threads of {machine['processor']} "
+        f"{run['peak_memory_bytes'] / 1e9:.2f} GB on {counted_of(run['threads'], 'thread')} of {machine['processor']} "
         f"({machine['cores']} cores), {run['started'][:10]}, revision {run['commit']}."
     )
 
