@@ -4,11 +4,13 @@ import json
 import re
 from pathlib import Path
 
+import msgspec
 import pytest
 from pages.book import figures, presets, readme_gaps
 from pages.full_size import interpolation, levers, record
 from pages.store.intervals import interval
 
+from endotsr.config import PRESETS, lengthened
 from endotsr.errors import InputError
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
@@ -71,6 +73,19 @@ def test_on_cutting_sharp_is_ahead_in_lpips():
             < min(others)
             == found["baselines"]["flow_interpolation"]["mean"]["lpips"]
         )
+
+
+@pytest.mark.parametrize("preset", ["quick", "sharp"])
+@pytest.mark.parametrize("clip", ["pulling", "cutting"])
+def test_three_recorded_seeds_have_the_settings_of_the_preset_today(clip, preset):
+    seeds = [run for name, run in record.stored(clip).items() if f"_{preset}_seed" in name]
+    assert [run["run"]["seed"] for run in seeds] == [0, 1, 2]
+    for run in seeds:
+        settings, trained = run["run"]["settings"], run["frames"]["training"]
+        wanted = msgspec.to_builtins(lengthened(PRESETS[preset], trained))
+        for section in ("model", "loss", "optimiser", "density", "initialisation"):
+            assert settings[section] == wanted[section], section
+        assert run["run"]["iteration"] == wanted["training"]["iterations"]
 
 
 def test_the_readme_states_the_minutes_that_were_timed():

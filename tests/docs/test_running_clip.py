@@ -2,6 +2,8 @@
 
 import numpy as np
 from pages.book import running_clip, running_scene
+from pages.store.commands import loaded
+from pages.store.program import RESULTS
 from running_clip import FOLDER, load
 
 from endotsr.method.splatting.render import render_forward
@@ -24,6 +26,12 @@ def test_three_seeds_are_above_the_blend_and_level_with_flow():
     assert [run["seed"] for run in RECORD["runs"]] == [0, 1, 2]
     assert (found["model"] > found["two_neighbours"] + 2).all()
     assert (abs(found["model"] - found["flow_interpolation"]) < 0.1).all()
+
+
+def test_larger_rates_put_three_seeds_ahead_of_flow():
+    """So chapter 14 says of the rates that `quick` has now."""
+    found = running_clip.means(loaded(RESULTS / "quick_simulated.json"))
+    assert found["model"].size == 3 and (found["model"] > found["flow_interpolation"] + 0.1).all()
 
 
 def rendered(clip, scene):

@@ -1,7 +1,8 @@
 """The tables of the presets in README.md and which_preset.md: time of trainings and whole commands, memory, quality.
 
 The records of quality are those of `full_size.record`, of times docs/results/minutes.json (`bench.minutes`), of whole
-commands waiting.json (`bench.waiting`), and of the simulated clip those of `book.running_clip` and of `full_size`.
+commands waiting.json (`bench.waiting`), and of the simulated clip quick_simulated.json, which `book.running_clip` wrote,
+and those of `full_size`. The running clip of the book is of earlier runs, with smaller learning rates.
 """
 
 from collections.abc import Mapping, Sequence
@@ -122,7 +123,7 @@ def cutting() -> str:
 
 def simulated() -> str:
     """PSNR of the presets that were trained on the simulated clip, and of what needs no model."""
-    seeds: dict[str, Any] = running_clip.means(running_clip.PROGRAM.read())
+    seeds: dict[str, Any] = running_clip.means(loaded(RESULTS / "quick_simulated.json"))
     model, paper = seeds["model"], mean_psnr(full_size.PROGRAM.read()["paper_eighth"], "model")
     rows = [["`quick`", f"{model.mean():.2f}", f"{model.size}"], ["`paper`", f"{paper:.2f}", "1"]]
     rows += [[LABELS[name], f"{np.mean(seeds[name]):.2f}", "-"] for name in PREDICTIONS[1:]]
