@@ -1,8 +1,8 @@
 """The tables of the presets in README.md and which_preset.md: time of trainings and whole commands, memory, quality.
 
 The records of quality are those of `full_size.record`, of times docs/results/minutes.json (`bench.minutes`), of whole
-commands waiting.json (`bench.waiting`), and of the simulated clip quick_simulated.json, which `book.running_clip` wrote,
-and those of `full_size`. The running clip of the book is of earlier runs, with smaller learning rates.
+commands waiting.json (`bench.waiting`), and of the simulated clip quick_simulated.json, which `book.running_clip`
+wrote, and those of `full_size`. The running clip of the book is of earlier runs, with smaller learning rates.
 """
 
 from collections.abc import Mapping, Sequence
