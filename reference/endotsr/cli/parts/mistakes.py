@@ -11,20 +11,28 @@ from endotsr.untrusted.sections import unknown_key
 LIKE_ENOUGH = 0.7  # minimum similarity of a suggested option
 LAST_NAME_ONLY = 0.95  # factor for a setting named without its section, to prefer an option of that name
 MOST_OFFERED = 3
+OF_PICTURE, SIDES = ("--size", "--resolution"), {"--width", "--height"}  # words for both sides of a picture
 OTHER_DASHES = "\N{EM DASH}\N{EN DASH}\N{MINUS SIGN}"  # that text programs make of hyphens
 
 
-def unknown_word(fields: list[Field], words: list[str], command: str) -> InputError:
-    """The error for words that belong to no option; it names the first unknown option, or else the first word."""
+def unknown_word(fields: list[Field], words: list[str], command: str, has_result: bool = False) -> InputError:
+    """The error for words that belong to no option; it names the first unknown option, or else the first word.
+
+    has_result   whether the line has an --out, so that the word is not the folder of the result
+    """
     option = next((word.split("=")[0] for word in words if word.startswith("-")), None)
+    names = option_names(fields)
     if option is None:
-        return InputError(f"{words[0]!r}: unexpected argument; `endotsr {command} --help` lists the options")
+        result = f"if the result goes there: --out {words[0]}; " if "--out" in names and not has_result else ""
+        return InputError(f"{words[0]!r}: unexpected argument; {result}`endotsr {command} --help` lists the options")
     if os.path.lexists(option):
         return InputError(f"{option}: no such option; for the file or folder of this name, write ./{option}")
     unknown_key = _unknown_key(fields, option)
     if unknown_key:
         return InputError(f"command line: {unknown_key}")
-    offered = _similar(option, option_names(fields))
+    if option in OF_PICTURE and SIDES <= set(names):
+        return InputError(f"{option}: no such option; use {' and '.join(sorted(SIDES, reverse=True))}")
+    offered = _similar(option, names)
     advice = f"did you mean {' or '.join(offered)}?" if offered else f"`endotsr {command} --help` lists the options"
     return InputError(f"{option}: no such option; {advice}")
 

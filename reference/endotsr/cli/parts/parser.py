@@ -58,7 +58,7 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
     refuse_other_dashes(fields, words)
     given, unknown = _given(fields, words)
     if unknown:
-        raise unknown_word(fields, unknown, command)
+        raise unknown_word(fields, unknown, command, has_result=("out",) in given)
     missing = [f for f in fields if f.default is REQUIRED and f.path not in given]
     if missing:
         names = ", ".join(f.name if f.positional else f"{f.name} {f.metavar}" for f in missing)

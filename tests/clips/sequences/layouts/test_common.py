@@ -265,3 +265,10 @@ def test_a_wrong_statement_of_the_polarity_is_named_with_its_file(tmp_path, caps
     text(tmp_path, 'excluded_value = "white"', 'excluded_value = "black"')
     assert main(["check", str(tmp_path)]) == 1
     assert f'set [masks] excluded_value = "white" in {tmp_path / FILE_NAME}' in capsys.readouterr().out
+
+
+def test_the_pictures_of_a_sequence_are_refused_with_the_folder_to_use(tmp_path, capsys):
+    written(tmp_path / "clip")
+    assert main(["train", str(tmp_path / "clip" / "images"), "--out", str(tmp_path / "run")]) == 2
+    said = capsys.readouterr().err
+    assert f"it is a part of the sequence {tmp_path / 'clip'}: use that folder" in said and "prepare" not in said

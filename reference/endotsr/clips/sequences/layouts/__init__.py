@@ -163,6 +163,14 @@ def refuse_unused(layout: Layout, path: Path, options: SourceOptions) -> None:
             )
 
 
+def _instead_of(path: Path) -> str:
+    """What to do in place of training on this folder: it is a part of a sequence, or needs `endotsr prepare`."""
+    above = path.resolve().parent
+    if path.is_dir() and any(layout.direct and layout.recognises(above) for layout in layouts()):
+        return f"it is a part of the sequence {above}: use that folder"
+    return f"`endotsr prepare {path} --out FOLDER` converts it"
+
+
 def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
     """The clip of a folder that training reads directly, with its faults and what it does not read.
 
@@ -180,7 +188,7 @@ def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
     if found is None or (found.name == "pictures" and (path / "depth").is_dir()):
         found = layout_of(path, "endonerf")  # its messages name the missing parts
     if not found.direct:
-        raise InputError(f"{path}: {found.about}; `endotsr prepare {path} --out FOLDER` converts it")
+        raise InputError(f"{path}: {found.about}; {_instead_of(path)}")
     clip = found.describe(path, SourceOptions(settings=config))
     if not clip.names and clip.faults:  # nothing is known of the folder, and so nothing of what is not read in it
         return clip
