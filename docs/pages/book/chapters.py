@@ -16,7 +16,7 @@ import time
 from typing import Any, NamedTuple
 
 from endotsr.errors import InputError
-from endotsr.untrusted.names import choice
+from endotsr.untrusted.names import choice, counted
 from pages.store.commands import loaded
 from pages.store.program import DOCS, Program
 from pages.store.tables import noted, where_and_cores
@@ -102,16 +102,16 @@ def table(times: dict[str, Any]) -> str:
     for name, chapter in chapters().items():
         spent = times["chapters"].get(name, {}).get("processor_seconds")
         steps = f"{chapter.steps} steps" if chapter.steps else "reverse pass" if chapter.derived else "measures only"
-        figures = f"{chapter.figures}" + (f", {chapter.plays} interactive" if chapter.plays else "")
-        exercises = f"{chapter.exercises}, {chapter.judged} judged"
-        cells = [steps, figures, exercises, "not measured" if spent is None else f"{spent:.0f} s"]
-        rows.append([f"{{doc}}`{name}`", chapter.equations, chapter.motive, *cells])
+        figures = counted(chapter.figures, "figure") + (f", {chapter.plays} interactive" if chapter.plays else "")
+        exercises = f"{counted(chapter.exercises, 'exercise')}, {chapter.judged} judged"
+        contents = (steps, figures, exercises, "time not measured" if spent is None else f"{spent:.0f} s")
+        rows.append([f"{{doc}}`{name}` {chapter.equations}".strip(), chapter.motive, "; ".join(contents)])
     total = sum(row["processor_seconds"] for row in times["chapters"].values())
     about = (
-        f"Run: processor time at the small size on one thread, kernels compiled before; {total / 60:.1f} minutes "
+        f"Times are processor time at the small size on one thread, kernels compiled before; {total / 60:.1f} minutes "
         f"together ({where_and_cores(times)}). *Judged*: by golden cases."
     )
-    return noted(("Chapter", "Equations", "Motive", "Derivation", "Figures", "Exercises", "Run"), rows, about)
+    return noted(("Chapter, with its equations", "Motive", "Contents"), rows, about)
 
 
 PROGRAM = Program(
