@@ -187,8 +187,9 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
         recorded_positions(Path(source), sequence)  # raises for a damaged truth before the training
     threads = use_threads(config.training.threads)
     config, schedule_note = of_length(config, len(sequence.train_index), schedule_note)
-    unit = None if options.minutes is None else _timed_unit(sequence, config)
-    if options.minutes is not None and unit is not None:
+    unit = None
+    if options.minutes is not None:
+        unit = _timed_unit(sequence, config)
         config, schedule_note = config_of_minutes(options.minutes, sequence, config, unit, threads)
     found: RunRecord = {}
     lines = ["effects: everything; `--effects auto` trains only the components that the clip needs"]
@@ -240,13 +241,8 @@ def config_of_minutes(
     )
 
 
-def _timed_unit(sequence: "Sequence", config: Config, known: float | None = None) -> float:
-    """Seconds per unit of work, from a few iterations; compiles the kernels first, if that was not done.
-
-    known   what an earlier call of this command found, which is returned
-    """
-    if known is not None:
-        return known
+def _timed_unit(sequence: "Sequence", config: Config) -> float:
+    """Seconds per unit of work, from a few iterations; compiles the kernels first, if that was not done."""
     from endotsr.training.fitting.compile_ahead import compile_ahead
     from endotsr.training.runs.pace import seconds_of_unit
 
@@ -321,8 +317,8 @@ def _progress(
         frames = frames.with_true_motion()
     perceived = lpips_file(options.lpips) is not None if options.evaluate else None
     pixels = sequence.width * sequence.height
-    timed = partial(_timed_unit, sequence, config, unit) if pixels >= LEAST_PIXELS or unit is not None else None
-    speed = known_speed(threads, timed)
+    timed = partial(_timed_unit, sequence, config) if pixels >= LEAST_PIXELS else None
+    speed = known_speed(threads, timed if unit is None else lambda: unit)
     plan = TimedCommand(config, frames, pixels, threads, perceived, vector_factor(), speed.beside)
     print(waiting_line(plan, speed, done_before(config).exists(), at))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)

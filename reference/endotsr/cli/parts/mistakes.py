@@ -11,7 +11,7 @@ from endotsr.untrusted.sections import unknown_key
 LIKE_ENOUGH = 0.7  # minimum similarity of a suggested option
 LAST_NAME_ONLY = 0.95  # factor for a setting named without its section, to prefer an option of that name
 MOST_OFFERED = 3
-OF_PICTURE, SIDES = ("--size", "--resolution"), {"--width", "--height"}  # words for both sides of a picture
+OF_PICTURE, SIDES = ("--size", "--resolution"), ("--width", "--height")  # words for both sides of a picture
 OTHER_DASHES = "\N{EM DASH}\N{EN DASH}\N{MINUS SIGN}"  # that text programs make of hyphens
 
 
@@ -30,8 +30,8 @@ def unknown_word(fields: list[Field], words: list[str], command: str, has_result
     unknown_key = _unknown_key(fields, option)
     if unknown_key:
         return InputError(f"command line: {unknown_key}")
-    if option in OF_PICTURE and SIDES <= set(names):
-        return InputError(f"{option}: no such option; use {' and '.join(sorted(SIDES, reverse=True))}")
+    if option in OF_PICTURE and set(SIDES) <= set(names):
+        return InputError(f"{option}: no such option; use {' and '.join(SIDES)}")
     offered = _similar(option, names)
     advice = f"did you mean {' or '.join(offered)}?" if offered else f"`endotsr {command} --help` lists the options"
     return InputError(f"{option}: no such option; {advice}")

@@ -6,6 +6,14 @@ OTHER_MODEL = "another camera model is not supported: calibrate as a pinhole cam
 RECTIFIED = "it follows from both cameras, and is computed again"
 OF_CALIBRATION = "it documents the calibration"
 
+# Key names are free in OpenCV's files: these are the names of OpenCV's samples and tutorials, SCARED and common tools.
+MATRICES = ("camera_matrix", "Camera_Matrix", "K", "cameraMatrix", "mtx", "camera_mtx", "intrinsic_matrix")
+DISTORTIONS = ("distortion_coefficients", "Distortion_Coefficients", "D", "distCoeffs", "dist", "dist_coeffs",
+               "dist_coeff", "distortion")  # fmt: skip
+PAIRS = (("M1", "M2"), ("K1", "K2"), ("cameraMatrix1", "cameraMatrix2"), ("mtx1", "mtx2"), ("mtxL", "mtxR"))
+PAIR_DISTORTIONS = (("D1", "D2"), ("distCoeffs1", "distCoeffs2"), ("dist1", "dist2"), ("distL", "distR"))
+
+MODELS = "fisheye_model fisheye distortion_model camera_model model model_type xi skew"
 PINHOLE = {  # values of fields that name the model, with which nothing is refused
     "distortion_model": ("plumb_bob", "rational_polynomial", "radtan"),
     "camera_model": ("pinhole", "PINHOLE", "perspective"),
@@ -48,16 +56,15 @@ ROS = Inventory(
 OPENCV = Inventory(
     "storage of OpenCV in YAML, XML or JSON, and the same names in an .npz file",
     used={
-        "camera_matrix Camera_Matrix K cameraMatrix mtx camera_mtx intrinsic_matrix": "intrinsics of one camera",
-        "distortion_coefficients Distortion_Coefficients D distCoeffs dist dist_coeffs dist_coeff distortion": "its"
-        " distortion",
-        "M1 M2 K1 K2 cameraMatrix1 cameraMatrix2 mtx1 mtx2 mtxL mtxR": "intrinsics of a pair",
-        "D1 D2 distCoeffs1 distCoeffs2 dist1 dist2 distL distR": "its distortions",
+        " ".join(MATRICES): "intrinsics of one camera",
+        " ".join(DISTORTIONS): "its distortion",
+        " ".join(map(" ".join, PAIRS)): "intrinsics of a pair",
+        " ".join(map(" ".join, PAIR_DISTORTIONS)): "its distortions",
         "R T": "pose of the right camera relative to the left, millimetres",
         "image_width image_height image_Width image_Height width height": "size of the pictures",
     },
     refused={
-        "fisheye_model fisheye distortion_model camera_model model model_type xi skew": OTHER_MODEL,
+        MODELS: OTHER_MODEL,
     },
     harmless={
         "E F R1 R2 P1 P2 Q H1 H2 rectified* roi roi1 roi2 validRoi* map*": RECTIFIED,
@@ -78,11 +85,10 @@ FLAT = Inventory(
         "fx fy cx cy": "intrinsics, pixel centres at integers",
         "width height w h image_width image_height": "size of the pictures",
         "k1 k2 p1 p2 k3 k4 k5 k6": "distortion in the model of OpenCV",
-        "distortion_coefficients Distortion_Coefficients D distCoeffs dist dist_coeffs dist_coeff distortion": "the"
-        " same as a list",
+        " ".join(DISTORTIONS): "the same as a list",
     },
     refused={
-        "fisheye_model fisheye distortion_model camera_model model model_type xi skew": OTHER_MODEL,
+        MODELS: OTHER_MODEL,
         "coeffs": "write the coefficients as k1, k2, p1, p2 and k3",
     },
     neutral=PINHOLE,

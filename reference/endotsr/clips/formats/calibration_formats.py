@@ -13,7 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.clips.formats.calibration_fields import INI, KALIBR, OPENCV, ROS
+from endotsr.clips.formats.calibration_fields import (
+    DISTORTIONS,
+    INI,
+    KALIBR,
+    MATRICES,
+    OPENCV,
+    PAIR_DISTORTIONS,
+    PAIRS,
+    ROS,
+)
 from endotsr.clips.formats.camera import rows_of_motion
 from endotsr.clips.formats.files import shortened
 from endotsr.errors import InputError
@@ -30,12 +39,6 @@ KALIBR_MODELS = {"camera_model": ("pinhole",), "distortion_model": ("radtan", "n
 ROS_MODELS, ROS_MARK = ("plumb_bob", "rational_polynomial"), "projection_matrix"
 ECHO = {"k": "camera_matrix", "d": "distortion_coefficients", "r": "rectification_matrix", "p": ROS_MARK,
         "width": "image_width", "height": "image_height"}  # fmt: skip
-# Key names are free in OpenCV's files: these are the names of OpenCV's samples and tutorials, SCARED and common tools.
-MATRICES = ("camera_matrix", "Camera_Matrix", "K", "cameraMatrix", "mtx", "camera_mtx", "intrinsic_matrix")
-DISTORTIONS = ("distortion_coefficients", "Distortion_Coefficients", "D", "distCoeffs", "dist", "dist_coeffs",
-               "dist_coeff", "distortion")  # fmt: skip
-PAIRS = (("M1", "M2"), ("K1", "K2"), ("cameraMatrix1", "cameraMatrix2"), ("mtx1", "mtx2"), ("mtxL", "mtxR"))
-PAIR_DISTORTIONS = (("D1", "D2"), ("distCoeffs1", "distCoeffs2"), ("dist1", "dist2"), ("distL", "distR"))
 CAMERA_NAMES = frozenset({*MATRICES, *(name for names in PAIRS for name in names)})
 SIZES = (("image_width", "image_height"), ("image_Width", "image_Height"), ("width", "height"))
 

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.clips.formats.calibration_fields import FLAT
+from endotsr.clips.formats.calibration_fields import DISTORTIONS, FLAT
 from endotsr.clips.formats.calibration_formats import (
-    DISTORTIONS,
     SIZES,
     Format,
     StoredCalibration,

@@ -21,9 +21,15 @@ if TYPE_CHECKING:
     from endotsr.clips.sequences.sequence import Sequence
     from endotsr.method.splatting.camera import Camera
 
+RUN_FILES = ("config.toml", "run.json", "sequence.json")  # of the folder of every training
 UNKNOWN_RATE = 15.0  # frames per second of films and animations of a recording of unknown rate
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1
 Row = tuple[Length, Length, Length]
+
+
+def is_run(path: Path) -> bool:
+    """Whether a folder is that of a training or of one with windows, whose pictures are results."""
+    return all((path / name).is_file() for name in RUN_FILES) or (path / "windows.json").is_file()
 
 
 class RecordedCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

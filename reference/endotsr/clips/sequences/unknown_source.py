@@ -9,6 +9,7 @@ from pathlib import Path
 
 from endotsr.clips.formats.files import shortened
 from endotsr.clips.formats.video_file import LARGEST_FILE, VIDEO_ENDINGS
+from endotsr.clips.sequences.record import is_run
 from endotsr.errors import InputError
 from endotsr.untrusted.files import open_regular
 from endotsr.untrusted.json import read_json
@@ -55,12 +56,6 @@ def _of_file(path: Path) -> str:
     if ending in RECORDINGS:
         return f": {RECORDINGS[ending]}; export its pictures as a video or as PNG files"
     return ": a video in a format that is not read; convert it to mp4" if ending in OTHER_VIDEOS else ""
-
-
-def is_run(path: Path) -> bool:
-    """Whether a folder is that of a training or of one with windows, whose pictures are results."""
-    of_one = all((path / name).is_file() for name in ("config.toml", "run.json", "sequence.json"))
-    return of_one or (path / "windows.json").is_file()
 
 
 def _of_run(path: Path) -> str:

@@ -27,7 +27,7 @@ from typing import IO
 
 import msgspec
 
-from endotsr.clips.sequences.record import SequenceRecord, read_sequence_record
+from endotsr.clips.sequences.record import RUN_FILES, SequenceRecord, read_sequence_record
 from endotsr.config import Config, config_to_toml, load_config, with_fixed_length
 from endotsr.errors import InputError
 from endotsr.training.runs.files import os_error_line, read_json, refuse_folder, refuse_link, warn, write_json
@@ -183,7 +183,7 @@ def create_run(path: Path, config: Config, record: RunRecord, sequence_record: S
 def open_run(path: Path) -> RunFolder:
     """An existing run folder. Raises InputError if there is none."""
     path = Path(path)
-    if not all((path / name).is_file() for name in ("config.toml", "run.json", "sequence.json")):
+    if not all((path / name).is_file() for name in RUN_FILES):
         from endotsr.training.runs.no_run import why_no_run
 
         raise InputError(f"{path}: {why_no_run(path)}")

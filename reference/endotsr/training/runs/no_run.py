@@ -8,10 +8,10 @@ from pathlib import Path
 
 from endotsr.clips.formats.files import shortened
 from endotsr.clips.sequences.layouts import layout_of
+from endotsr.clips.sequences.record import RUN_FILES, is_run
 from endotsr.errors import InputError
 from endotsr.untrusted.names import plain_line
 
-FILES = ("config.toml", "run.json", "sequence.json")  # of every run
 TRAIN = "`endotsr train {} --out RUN` makes a run of {}"
 
 
@@ -19,20 +19,15 @@ def why_no_run(path: Path) -> str:
     """Why a path is no run folder: what is there, and what to use."""
     if not path.exists():
         return "run folder not found"
-    if of := next((folder for folder in (path.parent, path.parent.parent) if _has_run(folder)), None):
+    if of := next((folder for folder in (path.parent, path.parent.parent) if is_run(folder)), None):
         return f"not a run folder, but a part of one; use {of}"
-    missing = FILES
+    missing = RUN_FILES
     if path.is_dir():
-        missing = [name for name in FILES if not (path / name).is_file()]
-        if runs := sorted(plain_line(folder.name) for folder in path.iterdir() if _has_run(folder)):
+        missing = [name for name in RUN_FILES if not (path / name).is_file()]
+        if runs := sorted(plain_line(folder.name) for folder in path.iterdir() if is_run(folder)):
             return f"not a run folder; use one of those in it: {shortened(runs)}"
-    clip = _of_clip(path) if len(missing) == len(FILES) else ""
+    clip = _of_clip(path) if len(missing) == len(RUN_FILES) else ""
     return clip or f"not a run folder: {missing[0]} is missing"
-
-
-def _has_run(path: Path) -> bool:
-    """Whether there is a run in a folder, with or without windows."""
-    return all((path / name).is_file() for name in FILES) or (path / "windows.json").is_file()
 
 
 def _of_clip(path: Path) -> str:

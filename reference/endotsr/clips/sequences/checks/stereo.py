@@ -83,9 +83,8 @@ class PairViews:
         where, names = str(files[0].parent), [file.name for file in files]
         left, right = (steps_between(small) for small in self.small)
         frozen = frozen_finding(left, right, names, where)
-        still = frozen or same_finding(*self.small, names, where)
-        if still := still or exchanged_finding(self.rows, where):
-            return still
+        if wrong := frozen or same_finding(*self.small, names, where) or exchanged_finding(self.rows, where):
+            return wrong
         late = late_finding(self.rows, where) or late_steps_finding(left, right, where)
         return late + row_finding(self.rows, where) + unequal_finding(*self.small, where)
 
@@ -165,10 +164,10 @@ def rows_apart(rows: list[RowMatches]) -> FloatArray:
 
     The fit is linear in the place, over all sampled frames. K is 0 for few matches, and where few of them agree.
     """
-    place, down = np.concatenate([r.place for r in rows], axis=1), np.concatenate([r.down for r in rows])
     none = np.zeros(0)
-    if down.size < FEWEST:
+    if sum(r.down.size for r in rows) < FEWEST:
         return none
+    place, down = np.concatenate([r.place for r in rows], axis=1), np.concatenate([r.down for r in rows])
     design = np.column_stack([np.ones(down.size), *(place - 0.5)])
     offset, near = np.full(down.size, np.median(down)), 4 * NEAR
     for _ in range(ROUNDS):
@@ -182,7 +181,7 @@ def rows_apart(rows: list[RowMatches]) -> FloatArray:
 
 def row_finding(rows: list[RowMatches], where: str) -> list[Finding]:
     """A warning on pairs whose rows are apart."""
-    apart = rows_apart(rows) if rows else np.zeros(0)
+    apart = rows_apart(rows)
     if not apart.size or np.median(apart) < APART:
         return []
     what = (

@@ -19,6 +19,7 @@ from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
+from endotsr.clips.sequences.record import is_run
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     files_of,
@@ -32,7 +33,6 @@ from endotsr.clips.sequences.sources import (
 )
 from endotsr.clips.sequences.stored_pairs import squeezed_note, view_size
 from endotsr.clips.sequences.times import usual_rate
-from endotsr.clips.sequences.unknown_source import is_run
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 
