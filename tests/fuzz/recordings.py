@@ -8,7 +8,7 @@ from pathlib import Path
 
 import common_folder
 import cv2
-import field_inputs
+import field_formats
 import made_videos
 import numpy as np
 import raw_sources
@@ -137,7 +137,7 @@ def yaml_seeds() -> list[bytes]:
     """A pair of OpenCV, a camera of ROS as `rostopic echo` prints it, a chain of Kalibr, and aliases."""
     repeated = "k: &k [60.0, 0, 31, 0, 61, 24, 0, 0, 1]\nd: &d [0.1, 0, 0, 0]\ncamera_matrix: {data: *k}\n"
     repeated += "distortion_coefficients: {data: *d}\nimage_width: !!int 64\nimage_height: 48\n"
-    plain = (field_inputs.ECHO, {"cam0": field_inputs.CHAIN, "cam1": field_inputs.CHAIN})
+    plain = (field_formats.ECHO, {"cam0": field_formats.CHAIN, "cam1": field_formats.CHAIN})
     return [_storage(".yml"), *(yaml.safe_dump(keys).encode() for keys in plain), repeated.encode()]
 
 
@@ -171,8 +171,8 @@ def _mat(variables: dict, packed: bool) -> bytes:
 @cache
 def matlab_seeds() -> list[bytes]:
     """One camera and two of MATLAB, and the variables of Bouguet's toolbox; packed and not."""
-    camera, pair = {"cameraParams": field_inputs.MAT_CAMERA}, {"stereoParams": field_inputs.MAT_PAIR}
-    return [_mat(variables, packed) for variables in (camera, pair, field_inputs.TOOLBOX) for packed in (False, True)]
+    camera, pair = {"cameraParams": field_formats.MAT_CAMERA}, {"stereoParams": field_formats.MAT_PAIR}
+    return [_mat(variables, packed) for variables in (camera, pair, field_formats.TOOLBOX) for packed in (False, True)]
 
 
 @cache

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from depth_folders import WRONG, recording
+from depth_folders import WRONG, recording, true_depth
 from made_videos import files
 from raw_sources import colmap
 from stereo_pairs import slanted_pair
 
 from endotsr.cli.main import main
+from endotsr.clips.prepare.stated_depth import bytes_exchanged
 
 
 @pytest.mark.parametrize("case", ["disparity in pixels", "stretched to 16 bits", "metres"])
@@ -41,3 +42,10 @@ def test_an_option_that_the_layout_does_not_read_is_refused(tmp_path, capsys):
         assert (
             f"the layout colmap does not read {option[0]}; of these options it reads --masks" in capsys.readouterr().err
         )
+
+
+@pytest.mark.parametrize("scale", [10, 100, 256])
+def test_the_bytes_of_right_depth_are_not_exchanged(scale):
+    stored = np.round(true_depth(0) * scale).astype(np.uint16)
+    assert not bytes_exchanged(stored.astype(np.float32))
+    assert bytes_exchanged(stored.byteswap().astype(np.float32))

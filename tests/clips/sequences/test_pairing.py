@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from depth_folders import true_depth
+from input_kinds import of_all_frames
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv.pictures import read_picture
@@ -173,3 +175,17 @@ def test_a_single_file_is_said_to_be_that_of_all_frames(tmp_path):
     given = numbered(tmp_path / "masks", "masks", [2], frames=[2])
     code, said = prepared(source, tmp_path / "o", *CAMERA, "--masks", given)
     assert code == 0 and "000002.png: taken for all 4 frames" in said
+
+
+@pytest.mark.parametrize(("name", "said"), [("{}.png", True), ("{:02}.png", False), ("frame-{:04}.color.png", False)])
+def test_names_that_sort_otherwise_as_text_are_named_for_an_array(name, said, tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros((12, 8, 8)))
+    planes = [tmp_path / f"a.npy/{k:06d}" for k in range(12)]
+    found = paired([Path("clip") / name.format(k) for k in range(12)], planes)
+    assert ("10.png stands in the place of 2.png" in found.note) == said
+
+
+def test_an_array_of_names_with_zeros_needs_no_caution(tmp_path, capsys):
+    words = of_all_frames(lambda k: true_depth(k).astype(np.float32), "--depth", lambda k: f"{k:02d}.png")(tmp_path)
+    assert main(words) == 0
+    assert "leading zeros" not in capsys.readouterr().out

@@ -9,8 +9,8 @@ import public_layouts
 import pytest
 import raw_sources
 from common_folder import written
+from dataset_inputs import rig
 from made_videos import files, pictures
-from rig_inputs import rig
 
 from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.layouts import describe, describe_for_training

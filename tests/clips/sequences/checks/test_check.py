@@ -17,6 +17,7 @@ from endonerf_writer import write_endonerf
 from endotsr.cli.main import main
 from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
+from endotsr.clips.sequences.checks.frames import rate_findings
 from endotsr.clips.sequences.checks.guard import MOST, SAID_ALREADY
 from endotsr.clips.sequences.forecast.cost import estimated_cost
 from endotsr.clips.sequences.forecast.seconds import expected_frames
@@ -261,6 +262,30 @@ def test_a_folder_without_a_part_of_a_sequence_is_sent_to_prepare(tmp_path, caps
         assert said.count("\n") == 1 and len(said) < 600
     (clip / "images").mkdir()
     assert main(["check", str(clip)]) == 1 and "masks-files" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("rate", [0.1, 1.0, 25.0, 59.94, 1000.0])
+def test_the_rates_of_cameras_are_not_named(rate):
+    assert rate_findings(np.arange(6) * (1 / rate), None, "here") == rate_findings(None, rate, "here") == []
+    assert rate_findings(None, None, "here") == []
+
+
+def test_a_broken_sequence_file_says_nothing_of_the_folders_beside_it(tmp_path, capsys):
+    written(tmp_path)
+    file = tmp_path / "sequence.toml"
+    file.write_text(file.read_text().replace("fx =", "focal ="))
+    assert main(["check", str(tmp_path)]) == 1
+    said = capsys.readouterr().out
+    assert "sequence-file" in said and "not-read" not in said
+
+
+def test_a_size_that_the_pictures_do_not_have_is_an_error_of_the_file(tmp_path, capsys):
+    written(tmp_path, masks=False, depth=False)
+    for file in (tmp_path / "images").iterdir():
+        write_png(file, read_png(file)[:20])
+    main(["check", str(tmp_path)])
+    said = capsys.readouterr().out
+    assert "states 32x24, the pictures have 32x20; sequence.toml" in said and "correct the poses" not in said
 
 
 @pytest.mark.data

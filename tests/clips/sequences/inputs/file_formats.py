@@ -6,7 +6,7 @@ import zlib
 from pathlib import Path
 
 import numpy as np
-from field_inputs import FRAMES, HEIGHT, WIDTH, Format, Keys, pictures, result
+from field_formats import FRAMES, HEIGHT, WIDTH, Format, Keys, pictures, result
 from input_kinds import exif
 
 from endotsr.clips.formats import picture_fields, pose_fields

@@ -1,29 +1,24 @@
 """How the inputs of `inputs_tried.py` are made, and how an outcome is checked."""
 
-import json
+import shutil
 import struct
-import sys
+import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+import av
 import numpy as np
-from PIL import Image
-
-sys.path.insert(0, str(Path(__file__).parents[3]))
 import public_layouts
-import raw_sources
 from builders import builder
-from calibration_files import kalibr, ros
-from common_folder import written
-from depth_folders import recording as with_depth
 from depth_folders import true_depth
-from made_videos import CAMERA, HEIGHT, WIDTH, files, pictures, write
-from public_layouts import K
+from made_videos import CAMERA, HEIGHT, WIDTH, files, picture, pictures, write
+from PIL import Image
+from scipy.spatial.transform import Rotation
 
-from endotsr.clips.opencv.pictures import write_jpeg
-from endotsr.clips.opencv.png import read_png, write_png
-from endotsr.clips.sequences.layouts import describe
+from endotsr.cli.main import main
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 
@@ -58,10 +53,6 @@ def both(*checks):
     return lambda folder: all(check(folder) for check in checks)
 
 
-def rated(rate: float):
-    return lambda folder: np.isclose(read_sequence_file(folder / "o").frame_rate, rate, rtol=1e-2)
-
-
 def timed(milliseconds):
     """The written times are these."""
     return lambda folder: np.allclose(
@@ -80,17 +71,6 @@ def baseline(millimetres: float):
     return lambda folder: np.isclose(read_sequence_file(folder / "o").camera.baseline, millimetres, atol=1e-4)
 
 
-@builder
-def sides(folder: Path, left, right, tolerance=12.0) -> bool:
-    """The written pairs are these."""
-    clip = describe(folder / "o")
-    return clip.count == len(left) == len(right) and all(
-        np.abs(pair.left.astype(int) - one).mean() <= tolerance
-        and np.abs(pair.right.astype(int) - other).mean() <= tolerance
-        for pair, one, other in zip(clip.pictures(list(range(clip.count))), left, right)
-    )
-
-
 def prepare(name: str, *words: str, camera=CAMERA):
     return lambda folder: ["prepare", str(folder / name), "--out", str(folder / "o"), *camera, *words]
 
@@ -101,10 +81,6 @@ def video(folder: Path, name: str, frames=None, *words: str, change=lambda path:
     write(folder / name, pictures() if frames is None else frames, **how)
     change(folder / name)
     return prepare(name, *words)(folder)
-
-
-def codec(kind: str, name: str, code: str, layout="yuv420p", **how) -> Row:
-    return Row(f"video, {kind}", video(name, None, codec=code, layout=layout, **how), "right", "", close(pictures()))
 
 
 @builder
@@ -139,36 +115,6 @@ def named(name, frames=None):
     return folder_of(frames or pictures(), change=change)
 
 
-@builder
-def trajectory(folder: Path, lines: list[str] | bytes, *words: str) -> list[str]:
-    """Pictures with a trajectory in a text file."""
-    (folder / "t.txt").write_bytes(lines if isinstance(lines, bytes) else "\n".join(lines).encode())
-    return folder_of(pictures(), "--trajectory", str(folder / "t.txt"), *words)(folder)
-
-
-def masked(frames, *words: str, count=12, change=lambda folder: None):
-    changed = change
-
-    def change(folder: Path) -> None:
-        files(folder, "m", frames[:count])
-        changed(folder / "m")
-
-    def make(folder: Path) -> list[str]:
-        return [*folder_of(pictures(), change=change)(folder), "--masks", str(folder / "m"), *words]
-
-    return make
-
-
-def mask(value=255):
-    plane = np.zeros((HEIGHT, WIDTH), np.uint8)
-    plane[:, :40] = value
-    return plane
-
-
-def half_excluded(folder: Path) -> bool:
-    return abs((read_png(folder / "o/masks/000003.png") > 0).mean() - 40 / WIDTH) < 0.01
-
-
 def rewritten(folder: Path, change=lambda opened: opened, ending="png", **how) -> None:
     """Every picture of a folder again, changed by Pillow."""
     for file in sorted(folder.iterdir()):
@@ -176,84 +122,6 @@ def rewritten(folder: Path, change=lambda opened: opened, ending="png", **how) -
             made = change(opened.copy())
         file.unlink()
         made.save(file.with_suffix(f".{ending}"), **how)
-
-
-def converted(ending: str, change=lambda opened: opened, **how):
-    return lambda folder: rewritten(folder / "clip", change, ending, **how)
-
-
-def exif(orientation: int = 1, space: int = 1) -> bytes:
-    made = Image.Exif()
-    made[0x0112] = orientation
-    made.get_ifd(0x8769)[0xA001] = space
-    return made.tobytes()
-
-
-def transparent(columns: int):
-    """The first columns of the pictures are transparent."""
-
-    def changed(opened):
-        alpha = np.full(opened.size[::-1], 255, np.uint8)
-        alpha[:, :columns] = 0
-        opened.putalpha(Image.fromarray(alpha))
-        return opened
-
-    return converted("png", changed)
-
-
-def as_transparency(folder: Path) -> None:
-    """Masks as drawing programs write them: black, and transparent where nothing is marked."""
-
-    def changed(opened):
-        black = Image.new("RGB", opened.size)
-        black.putalpha(opened)
-        return black
-
-    rewritten(folder, changed)
-
-
-def labels(*colour: int):
-    """Masks with a palette in which 1 has this colour, as tools that annotate instruments store them."""
-
-    def changed(opened):
-        made = opened.point(lambda value: value // 255).convert("P")
-        made.putpalette([0, 0, 0, *colour])
-        return made
-
-    return lambda folder: rewritten(folder, changed)
-
-
-def blank():
-    return Image.new("RGB", (WIDTH, HEIGHT))
-
-
-@builder
-def shortened(folder: Path, ending: str) -> None:
-    """The last twentieth of the fourth file is missing."""
-    converted(ending)(folder)
-    cut(0.95)(folder / f"clip/0003.{ending}")
-
-
-def every_second_jpg(folder: Path) -> None:
-    for file in sorted((folder / "clip").iterdir())[::2]:
-        pixels = read_png(file)
-        file.unlink()
-        write_jpeg(file.with_suffix(".jpg"), pixels)
-
-
-@builder
-def depth(folder: Path, values, *words, name="depth", kind="npy") -> list[str]:
-    return [*with_depth(folder, values, name, kind), *words]
-
-
-@builder
-def depth_files(folder: Path, save, ending: str, *words: str) -> list[str]:
-    """True depth in files of another kind; `save` gets the path and the plane of a frame."""
-    found = with_depth(folder, true_depth)
-    for i, file in enumerate(sorted((folder / "depth").iterdir())):
-        file.unlink()
-        save(file.with_suffix(ending), true_depth(i))
-    return [*found, *words]
 
 
 def depth_is_true(folder: Path) -> bool:
@@ -276,11 +144,6 @@ def public(layout: str, *words: str, change=lambda folder: None, **how):
     return raw(lambda folder: getattr(public_layouts, layout)(folder, **how), *words, change=change)
 
 
-def colmap(*words: str, binary: bool = False, frames: int = 6, change=lambda folder: None):
-    """A COLMAP model."""
-    return raw(lambda folder: raw_sources.colmap(folder, binary, frames), *words, change=change)
-
-
 def centred(folder: Path) -> bool:
     """The written principal point is the middle of the picture: half a pixel was added once."""
     camera = read_sequence_file(folder / "o").camera
@@ -296,31 +159,7 @@ def calibrated(folder: Path, name: str, text: str, *words: str, folders=()) -> l
     return prepare("clip", "--calibration", str(folder / name), *words, camera=())(folder)
 
 
-def ros_text(**changes) -> str:
-    return ros(K, [0.0] * 5, **changes)
-
-
-def kalibr_text(**changes) -> str:
-    return kalibr(pair=False, distortion_coeffs=[0.0] * 4, **changes)
-
-
 MATRIX = "100 0 63.5\n0 101 47.5\n0 0 1\n"
-OPENCV = """%YAML:1.0
----
-camera_matrix: !!opencv-matrix
-   rows: 3
-   cols: 3
-   dt: d
-   data: [100., 0., 63.5, 0., 101., 47.5, 0., 0., 1.]
-"""
-
-
-@builder
-def common(folder: Path, *words: str, command="check", change=lambda clip: None, **changes) -> list[str]:
-    """A folder in the common format."""
-    written(folder / "clip", **changes)
-    change(folder / "clip")
-    return [command, str(folder / "clip"), *words]
 
 
 @builder
@@ -342,19 +181,6 @@ def first_to_last(first: int, last: int | None = None, step: int = 1):
     return lambda text: "\n".join(text.splitlines()[first:last:step]) + "\n"
 
 
-def frames_changed(**changes):
-    """Every entry of the frames of transforms.json, with keys that are computed from it or added."""
-
-    def entry(frame):
-        return frame | {key: value(frame) if callable(value) else value for key, value in changes.items()}
-
-    def change(text: str) -> str:
-        data = json.loads(text)
-        return json.dumps(data | {"frames": [entry(frame) for frame in data["frames"]]})
-
-    return reworded("transforms.json", change)
-
-
 def tiff(path: Path, plane: np.ndarray, black_is_zero: int = 1, bits: int = 16, sign: int = 1) -> None:
     """A TIFF written by hand, with 0 as white if `black_is_zero` is 0; `sign`: 2 signed, 3 real numbers."""
     height, width = plane.shape
@@ -367,7 +193,118 @@ def tiff(path: Path, plane: np.ndarray, black_is_zero: int = 1, bits: int = 16, 
     )
 
 
+@cache
+def moving_clip() -> tempfile.TemporaryDirectory:
+    """A clip of a moving scope, which is simulated once."""
+    kept = tempfile.TemporaryDirectory()
+    size = ["--width", "160", "--height", "128", "--frames", "14"]
+    assert main(["simulate", "moving-camera", "--out", f"{kept.name}/clip", *size, "-q"]) == 0
+    return kept
+
+
+def moving(folder: Path) -> None:
+    """A copy of this clip; its poses stay in true.npy."""
+    shutil.copytree(f"{moving_clip().name}/clip", folder / "clip")
+    np.save(folder / "true.npy", np.load(folder / "clip/poses_bounds.npy")[:, :15])
+
+
+def true_poses(folder: Path, kept: slice = slice(None), tolerance: float = 1e-4) -> bool:
+    """The written poses are those of the kept frames of the clip."""
+    written = np.array(read_sequence_file(folder / "o").poses.matrices).reshape(-1, 3, 4)
+    true = np.load(folder / "true.npy").reshape(-1, 3, 5)[kept]
+    turns = (true[:, :, :3] * [1.0, -1.0, -1.0]).transpose(0, 2, 1)
+    shifts = -np.einsum("nij,nj->ni", turns, true[:, :, 3])
+    return np.allclose(written, np.concatenate([turns, shifts[:, :, None]], axis=2), atol=tolerance)
+
+
+TWICE = [picture(i // 2) for i in range(40)]
+MOVED = [np.roll(shown, -5, axis=1) for shown in pictures()]
+
+
+def matrices(folder: Path) -> np.ndarray:
+    """The true camera-to-world matrices (n, 3, 4) of a clip of a moving scope."""
+    moving(folder)
+    true = np.load(folder / "true.npy").reshape(-1, 3, 5)
+    return np.concatenate([true[:, :, :3] * [1.0, -1.0, -1.0], true[:, :, 3:4]], axis=2)
+
+
+def lens_of(clip: Path) -> tuple[float, ...]:
+    focal = float(np.load(clip / "poses_bounds.npy")[0, 14])
+    return focal, focal, 80.0, 64.0
+
+
+def squared(found: np.ndarray) -> np.ndarray:
+    last = np.broadcast_to(np.array([[[0.0, 0, 0, 1]]]), (len(found), 1, 4))
+    return np.concatenate([found, last], axis=1)
+
+
+def quaternions(found: np.ndarray, order: str = "xyzw") -> np.ndarray:
+    return Rotation.from_matrix(found[:, :, :3]).as_quat()[:, ["xyzw".index(axis) for axis in order]]
+
+
+EUROC_HEAD = (
+    "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m"
+    " s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1],"
+    " b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]"
+)
+BEGIN, STEP = 1403636579763555584, 50_000_000  # nanoseconds: 20 pictures a second
+
+
+def true_rig(folder: Path, kept: slice = slice(None), baseline: float = 0.0) -> bool:
+    """The written cameras are the true ones, and so are intrinsics, times and baseline."""
+    found = read_sequence_file(folder / "o")
+    times = np.arange(14)[kept] * STEP / 1e9
+    stated = np.array(found.times) if found.times else np.arange(found.frames) / found.frame_rate
+    return (
+        true_poses(folder, kept, 1e-3)
+        and np.allclose([found.camera.fx, found.camera.cx, found.camera.cy], [142.4, 80, 64], atol=1e-3)
+        and np.allclose(stated - stated[0], times - times[0], atol=1e-4)
+        and np.isclose(found.camera.baseline, baseline, atol=1e-4)
+    )
+
+
+P = "{}: 100 0 63.5 {} 0 100 47.5 0 0 0 1 0\n"
+
+
 @builder
-def each(clip: Path, name, change) -> None:
-    for file in sorted((clip / name).iterdir()):
-        write_png(file, change(read_png(file)))
+def of_all_frames(folder: Path, planes, option: str, name=lambda k: f"{k}.png") -> list[str]:
+    """One array for the clip, in the order of these names sorted as text."""
+    files(folder, "clip", pictures())
+    for k, file in enumerate(sorted((folder / "clip").iterdir())):
+        file.rename(file.with_name(name(k)))
+    np.save(folder / "a.npy", np.stack([planes(k) for k in sorted(range(12), key=name)]))
+    return [*prepare("clip")(folder), option, str(folder / "a.npy")]
+
+
+def exchanged_frames(frames: list) -> list:
+    """Frames 6 and 7 in each other's place."""
+    return [*frames[:6], frames[7], frames[6], *frames[8:]]
+
+
+def slow(count: int = 16) -> list[np.ndarray]:
+    return [picture(0.5 * i) for i in range(count)]
+
+
+def exif(orientation: int = 1, space: int = 1) -> bytes:
+    made = Image.Exif()
+    made[0x0112] = orientation
+    made.get_ifd(0x8769)[0xA001] = space
+    return made.tobytes()
+
+
+GROUPS = {"g": "12", "bf": "2"}  # options of the encoder: a whole picture in twelve
+
+
+def hidden_lead_in(folder: Path) -> list[str]:
+    """An mp4 whose edit list hides the first five pictures, as a cut without coding leaves it."""
+    write(folder / "whole.mp4", pictures(24), options=GROUPS)
+    how = {"avoid_negative_ts": "disabled"}
+    with av.open(str(folder / "whole.mp4")) as whole, av.open(str(folder / "a.mp4"), "w", options=how) as out:
+        source = whole.streams.video[0]
+        stream = out.add_stream_from_template(source)
+        for packet in whole.demux(source):
+            if packet.size:
+                lead = 5 * packet.duration
+                packet.pts, packet.dts, packet.stream = packet.pts - lead, packet.dts - lead, stream
+                out.mux(packet)
+    return prepare("a.mp4")(folder)

@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import public_layouts
-from field_inputs import Format, Keys, result
+from field_formats import Format, Keys, result
 
 from endotsr.clips.sequences.layouts import c3vd, describe, hamlyn, scared, servct
 from endotsr.clips.sequences.source_options import SourceOptions

@@ -5,7 +5,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from field_inputs import Format, Keys
+from field_formats import Format, Keys
 from file_formats import saved, whole
 from made_videos import pictures, write
 from video_formats import told as with_count

@@ -1,8 +1,8 @@
 """Every field of a format is used, refused by name, harmless with a reason, or noted as unknown."""
 
 import pytest
-from field_inputs import FORMATS as NAMED
-from field_inputs import Format
+from field_formats import FORMATS as NAMED
+from field_formats import Format
 from file_formats import FILES
 from layout_formats import LAYOUTS
 from layout_formats import OTHER_NAMES as OF_FOLDERS
@@ -76,7 +76,7 @@ def test_the_base_has_every_used_field_or_a_change_adds_it(name):
     for pattern in patterns:
         inventory = Inventory("", {pattern: "x"})
         known = pattern in spelled or any(inventory.reason(inventory.used, field) for field in tried)
-        assert known, f"field_inputs.py: give {name!r} a value of {pattern}, and another value that changes the clip"
+        assert known, f"field_formats.py: give {name!r} a value of {pattern}, and another value that changes the clip"
 
 
 ALIASES = {"image_width", "width", "image_height", "height", "camera_matrix", "K", "k", "distortion_coefficients", "D",

@@ -11,9 +11,9 @@ from pathlib import Path
 import av
 import numpy as np
 import yaml
-from field_inputs import Format, Keys, result, stated, write_yaml
-from field_inputs import pictures as pictures_of
-from left_inputs import hidden_lead_in
+from field_formats import Format, Keys, result, stated, write_yaml
+from field_formats import pictures as pictures_of
+from input_kinds import hidden_lead_in
 from made_videos import pictures, turn
 
 from endotsr.clips.formats import video_marks
