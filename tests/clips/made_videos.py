@@ -70,7 +70,8 @@ def write(path: Path, frames: list[Picture], codec: str = "libx264", rate: int =
 
     milliseconds  of every frame; None: evenly spaced at `rate`
     more          `options` of the encoder, those of the `container`, `layout` (pixel format), `shape` (of a pixel),
-                  `transfer` (function), `primaries` (of colour)
+                  `transfer` (function), `primaries` (of colour),
+                  `stereo_mode` (of Matroska), `matrix` of the colours, `colorspace` (its mark)
     """
     with own_scheduling(), av.open(str(path), "w", options=more.get("container") or {}) as container:
         stream = container.add_stream(codec, rate=1000 if milliseconds else rate, options=more.get("options") or {})
@@ -78,12 +79,18 @@ def write(path: Path, frames: list[Picture], codec: str = "libx264", rate: int =
         stream.pix_fmt = more.get("layout") or "yuv420p"
         if "shape" in more:
             stream.codec_context.sample_aspect_ratio = more["shape"]
+        if more.get("stereo_mode"):
+            stream.metadata["stereo_mode"] = more["stereo_mode"]
+        if "colorspace" in more:
+            stream.codec_context.colorspace = more["colorspace"]
         if "primaries" in more:
             stream.codec_context.color_primaries = more["primaries"]
         if "transfer" in more:
             stream.codec_context.color_trc = more["transfer"]
         for i, pixels in enumerate(frames):
             frame = av.VideoFrame.from_ndarray(pixels, format="rgb24")
+            if "matrix" in more:
+                frame = frame.reformat(format=stream.pix_fmt, dst_colorspace=more["matrix"])
             if milliseconds:
                 frame.pts, frame.time_base = milliseconds[i], Fraction(1, 1000)
             container.mux(stream.encode(frame))

@@ -1,74 +1,21 @@
-"""How the inputs of `inputs_tried.py` are made, and how an outcome is checked."""
+"""How the inputs of `inputs_tried.py` are made."""
 
 import shutil
 import struct
 import tempfile
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import av
 import numpy as np
 import public_layouts
 from builders import builder
-from depth_folders import true_depth
-from made_videos import CAMERA, HEIGHT, WIDTH, files, picture, pictures, write
+from made_videos import CAMERA, files, picture, pictures, write
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv.png import read_png
-from endotsr.clips.sequences.sequence_file import read_sequence_file
-
-
-class Row(NamedTuple):
-    """One kind of input."""
-
-    kind: str
-    make: Callable[[Path], list[str]]  # makes the input in a folder; the words of the command
-    expected: str  # right, told or refused
-    said: str = ""  # a part of what is printed
-    check: Callable[[Path], bool] = lambda folder: True  # of what was written
-
-
-class Outcome(NamedTuple):
-    """What a command did."""
-
-    row: Row
-    command: str
-    outcome: str
-    message: str
-
-
-@builder
-def close(folder: Path, frames, tolerance=10.0) -> bool:
-    """The written pictures are these."""
-    files = sorted((folder / "o/images").iterdir())
-    apart = [np.abs(read_png(f).astype(int) - p.astype(int)).mean() for f, p in zip(files, frames, strict=True)]
-    return max(apart) < tolerance
-
-
-def both(*checks):
-    return lambda folder: all(check(folder) for check in checks)
-
-
-def timed(milliseconds):
-    """The written times are these."""
-    return lambda folder: np.allclose(
-        read_sequence_file(folder / "o").times or [], np.array(milliseconds) / 1e3, atol=2e-3
-    )
-
-
-@builder
-def size(folder: Path, width, height) -> bool:
-    """The written size is this, and so is that of the camera."""
-    camera, seen = read_sequence_file(folder / "o").camera, read_png(folder / "o/images/000000.png")
-    return (camera.width, camera.height) == (width, height) == (seen.shape[1], seen.shape[0])
-
-
-def baseline(millimetres: float):
-    return lambda folder: np.isclose(read_sequence_file(folder / "o").camera.baseline, millimetres, atol=1e-4)
+from endotsr.clips.opencv.png import read_png, write_png
 
 
 def prepare(name: str, *words: str, camera=CAMERA):
@@ -84,16 +31,44 @@ def video(folder: Path, name: str, frames=None, *words: str, change=lambda path:
 
 
 @builder
-def cut(path: Path, part: float, whole=None) -> None:
-    data = path.read_bytes()
-    path.write_bytes(data[: int(len(data) * part)])
+def each(folder: Path, name: str, change) -> None:
+    """The pictures in a folder of it, changed."""
+    for file in sorted((folder / name).iterdir()):
+        write_png(file, change(read_png(file)))
 
 
 @builder
-def folder_of(folder: Path, frames, *words: str, ending="png", change=lambda folder: None) -> list[str]:
+def changed_bytes(path: Path, change) -> None:
+    path.write_bytes(change(path.read_bytes()))
+
+
+def cut(part: float):
+    return changed_bytes(lambda data: data[: int(len(data) * part)])
+
+
+@builder
+def folder_of(folder: Path, frames, *words: str, ending="png", change=lambda folder: None, camera=CAMERA) -> list[str]:
+    """Pictures in clip/."""
     files(folder, "clip", frames, ending)
     change(folder)
-    return prepare("clip", *words)(folder)
+    return prepare("clip", *words, camera=camera)(folder)
+
+
+def twelve(*words: str, **how):
+    """The twelve usual pictures in clip/."""
+    return folder_of(pictures(), *words, **how)
+
+
+def put(path: Path, what) -> None:
+    """Text, bytes, or what a function writes, as a file."""
+    what(path) if callable(what) else path.write_bytes(what if isinstance(what, bytes) else what.encode())
+
+
+@builder
+def with_file(folder: Path, option: str, name: str, what, *words: str) -> list[str]:
+    """The usual pictures, and a file of an option; see `put`."""
+    put(folder / name, what)
+    return twelve(option, str(folder / name), *words)(folder)
 
 
 @builder
@@ -124,13 +99,6 @@ def rewritten(folder: Path, change=lambda opened: opened, ending="png", **how) -
         made.save(file.with_suffix(f".{ending}"), **how)
 
 
-def depth_is_true(folder: Path) -> bool:
-    entry = read_sequence_file(folder / "o").depth
-    return (
-        entry is not None and np.abs(read_png(folder / "o/depth/000002.png") * entry.scale - true_depth(2)).max() < 0.03
-    )
-
-
 @builder
 def raw(folder: Path, write_raw, *words: str, change=lambda folder: None, camera=()) -> list[str]:
     """A folder of another program in raw/, changed."""
@@ -144,18 +112,12 @@ def public(layout: str, *words: str, change=lambda folder: None, **how):
     return raw(lambda folder: getattr(public_layouts, layout)(folder, **how), *words, change=change)
 
 
-def centred(folder: Path) -> bool:
-    """The written principal point is the middle of the picture: half a pixel was added once."""
-    camera = read_sequence_file(folder / "o").camera
-    return abs(camera.cx - WIDTH / 2) < 1e-3 and abs(camera.cy - HEIGHT / 2) < 1e-3
-
-
 @builder
-def calibrated(folder: Path, name: str, text: str, *words: str, folders=()) -> list[str]:
-    """Pictures in clip/, or in these folders of it, with a calibration of another program."""
-    for place in folders or (".",):
+def calibrated(folder: Path, name: str, what, *words: str, folders=(".",)) -> list[str]:
+    """Pictures in clip/, or in these folders of it, with a calibration; see `put`."""
+    for place in folders:
         files(folder / "clip", place, pictures())
-    (folder / name).write_text(text)
+    put(folder / name, what)
     return prepare("clip", "--calibration", str(folder / name), *words, camera=())(folder)
 
 
@@ -163,17 +125,27 @@ MATRIX = "100 0 63.5\n0 101 47.5\n0 0 1\n"
 
 
 @builder
-def with_files(folder: Path, *names: str) -> None:
+def with_files(folder: Path, *names: str, text: str = "1") -> None:
     """Further files in a folder."""
     for name in names:
         (folder / name).parent.mkdir(exist_ok=True)
-        (folder / name).write_text("1")
+        (folder / name).write_text(text)
+
+
+@builder
+def without(folder: Path, name: str) -> None:
+    """A file or a folder less."""
+    shutil.rmtree(folder / name) if (folder / name).is_dir() else (folder / name).unlink()
 
 
 @builder
 def reworded(folder: Path, name: str, change) -> None:
     """A text file of a folder, changed."""
     (folder / name).write_text(change((folder / name).read_text()))
+
+
+def replaced(name: str, old: str, new: str):
+    return reworded(name, lambda text: text.replace(old, new))
 
 
 def first_to_last(first: int, last: int | None = None, step: int = 1):
@@ -208,15 +180,6 @@ def moving(folder: Path) -> None:
     np.save(folder / "true.npy", np.load(folder / "clip/poses_bounds.npy")[:, :15])
 
 
-def true_poses(folder: Path, kept: slice = slice(None), tolerance: float = 1e-4) -> bool:
-    """The written poses are those of the kept frames of the clip."""
-    written = np.array(read_sequence_file(folder / "o").poses.matrices).reshape(-1, 3, 4)
-    true = np.load(folder / "true.npy").reshape(-1, 3, 5)[kept]
-    turns = (true[:, :, :3] * [1.0, -1.0, -1.0]).transpose(0, 2, 1)
-    shifts = -np.einsum("nij,nj->ni", turns, true[:, :, 3])
-    return np.allclose(written, np.concatenate([turns, shifts[:, :, None]], axis=2), atol=tolerance)
-
-
 TWICE = [picture(i // 2) for i in range(40)]
 MOVED = [np.roll(shown, -5, axis=1) for shown in pictures()]
 
@@ -247,22 +210,6 @@ EUROC_HEAD = (
     " s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1],"
     " b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]"
 )
-BEGIN, STEP = 1403636579763555584, 50_000_000  # nanoseconds: 20 pictures a second
-
-
-def true_rig(folder: Path, kept: slice = slice(None), baseline: float = 0.0) -> bool:
-    """The written cameras are the true ones, and so are intrinsics, times and baseline."""
-    found = read_sequence_file(folder / "o")
-    times = np.arange(14)[kept] * STEP / 1e9
-    stated = np.array(found.times) if found.times else np.arange(found.frames) / found.frame_rate
-    return (
-        true_poses(folder, kept, 1e-3)
-        and np.allclose([found.camera.fx, found.camera.cx, found.camera.cy], [142.4, 80, 64], atol=1e-3)
-        and np.allclose(stated - stated[0], times - times[0], atol=1e-4)
-        and np.isclose(found.camera.baseline, baseline, atol=1e-4)
-    )
-
-
 P = "{}: 100 0 63.5 {} 0 100 47.5 0 0 0 1 0\n"
 
 
@@ -276,13 +223,7 @@ def of_all_frames(folder: Path, planes, option: str, name=lambda k: f"{k}.png") 
     return [*prepare("clip")(folder), option, str(folder / "a.npy")]
 
 
-def exchanged_frames(frames: list) -> list:
-    """Frames 6 and 7 in each other's place."""
-    return [*frames[:6], frames[7], frames[6], *frames[8:]]
-
-
-def slow(count: int = 16) -> list[np.ndarray]:
-    return [picture(0.5 * i) for i in range(count)]
+EXCHANGED = [picture(0.5 * i) for i in (0, 1, 2, 3, 4, 5, 7, 6, 8, 9, 10, 11, 12, 13, 14, 15)]
 
 
 def exif(orientation: int = 1, space: int = 1) -> bytes:

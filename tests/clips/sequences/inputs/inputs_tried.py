@@ -8,7 +8,8 @@ what was done or assumed), `refused` (exit code 1 or 2 and one line), or `WRONG 
 asserts every row.
 
 The rows lie in the file of their subject, `picture_inputs.py` to `command_inputs.py`: one about masks of a video in
-that of masks, one about a public layout in `dataset_inputs.py`. What several files make is in `input_kinds.py`.
+that of masks, one about a public layout in `dataset_inputs.py`. What several files make is in
+`input_kinds.py`, and what checks an outcome in `input_rows.py`.
 """
 
 import contextlib
@@ -23,7 +24,7 @@ from calibration_inputs import CALIBRATION_ROWS
 from command_inputs import COMMAND_ROWS
 from dataset_inputs import DATASET_ROWS
 from depth_inputs import DEPTH_ROWS
-from input_kinds import Outcome, Row
+from input_rows import Outcome, Row
 from mask_inputs import MASK_ROWS
 from model_inputs import MODEL_ROWS
 from picture_inputs import PICTURE_ROWS

@@ -1,12 +1,11 @@
 """Rows of `inputs_tried.py` about masks: numbers, files of other programs, videos of masks."""
 
-import json
 from pathlib import Path
 
-import av
 import numpy as np
 from builders import builder
-from input_kinds import Row, folder_of, of_all_frames, rewritten, tiff
+from input_kinds import each, folder_of, of_all_frames, rewritten, tiff, twelve, with_file
+from input_rows import refused, right, told
 from made_videos import HEIGHT, WIDTH, files, pictures, write
 from PIL import Image
 
@@ -14,23 +13,19 @@ from endotsr.clips.formats.conversions import LOADS as LOADS_OF
 from endotsr.clips.opencv.png import read_png, write_png
 
 
-def masked(frames, *words: str, count=12, change=lambda folder: None):
-    changed = change
-
-    def change(folder: Path) -> None:
-        files(folder, "m", frames[:count])
-        changed(folder / "m")
-
-    def make(folder: Path) -> list[str]:
-        return [*folder_of(pictures(), change=change)(folder), "--masks", str(folder / "m"), *words]
-
-    return make
-
-
 def mask(value=255):
     plane = np.zeros((HEIGHT, WIDTH), np.uint8)
     plane[:, :40] = value
     return plane
+
+
+@builder
+def masked(folder: Path, frames=None, *words: str, count=12, change=lambda folder: None) -> list[str]:
+    """The usual pictures with masks, of which one array is that of all."""
+    given = mask() if frames is None else frames
+    files(folder, "m", (given if isinstance(given, list) else [given] * 12)[:count])
+    change(folder / "m")
+    return [*twelve()(folder), "--masks", str(folder / "m"), *words]
 
 
 def half_excluded(folder: Path) -> bool:
@@ -61,31 +56,10 @@ def labels(*colour: int):
 
 def united_masks(folder: Path) -> list[str]:
     """Two sets of masks, each of which excludes a part of what both do."""
-    parts = [mask(), mask()]
-    parts[0][:, 20:], parts[1][:, :20] = 0, 0
-    for name, part in zip("ab", parts):
-        files(folder, name, [part] * 12)
-    words = folder_of(pictures())(folder)
-    return [*words, "--masks", str(folder / "a"), "--unite-masks", str(folder / "b")]
-
-
-def two_labels(small: int) -> np.ndarray:
-    """Object 2 in the left columns, and a square of object 1."""
-    plane = mask(2)
-    plane[:small, 60 : 60 + small] = 1
-    return plane
-
-
-def three_labels() -> np.ndarray:
-    plane = np.zeros((HEIGHT, WIDTH), np.uint8)
-    for k in range(3):
-        plane[:, 30 * k : 30 * k + 30] = k + 1
-    return plane
-
-
-def objects(i: int) -> np.ndarray:
-    """Numbers of two instruments: 1 and 2."""
-    return mask(1) + mask(1) * (np.arange(WIDTH) < 20).astype(np.uint8)
+    files(folder, "b", [np.where(np.arange(WIDTH) < 20, mask(), 0).astype(np.uint8)] * 12)
+    return masked(np.where(np.arange(WIDTH) < 20, 0, mask()).astype(np.uint8), "--unite-masks", str(folder / "b"))(
+        folder
+    )
 
 
 EMPTY = (5, 8)  # frames without an instrument
@@ -138,90 +112,37 @@ def of_video(folder: Path, frames: list[np.ndarray], *words: str, name: str = "m
 
 
 @builder
-def exported_from_video(folder: Path, frames: list[np.ndarray]) -> list[str]:
-    """The masks as pictures that were exported from a video of them."""
-    words = of_video(frames, options={"crf": "38"})(folder)
-    (folder / "m").mkdir()
-    with av.open(str(folder / "m.mp4")) as container:
-        for i, frame in enumerate(container.decode(video=0)):
-            write_png(folder / "m" / f"{i:04d}.png", frame.to_ndarray(format="rgb24"))
-    return [str(folder / "m") if word == str(folder / "m.mp4") else word for word in words]
-
-
-def void() -> np.ndarray:
-    """Objects 1 and 2, and 255 where the annotator left a border open."""
-    plane = mask(1)
-    plane[:30, 60:90], plane[50:60, 60:64] = 2, 255
-    return plane
-
-
-@builder
-def with_tool(folder: Path, masks: list[np.ndarray], *words: str) -> list[str]:
+def with_tool(folder: Path, masks: np.ndarray, *words: str) -> list[str]:
     """Red tissue and a grey instrument in the left columns, with these masks."""
     words_of = masked(masks, *words)(folder)
-    for file in (folder / "clip").iterdir():
-        pixels = read_png(file).copy()
-        pixels[:, :40] = pixels[:, :40].mean(axis=2, keepdims=True)
-        write_png(file, pixels)
+    each(
+        "clip", lambda shown: np.where(mask()[..., None] > 0, shown.mean(axis=2, keepdims=True), shown).astype(np.uint8)
+    )(folder)
     return words_of
 
 
-HARD = with_empty([mask()] * 12, lambda i: mask(0))
+HARD, SMOOTH = (with_empty([plane] * 12, lambda i: mask(0)) for plane in (mask(), smooth()))
 
 
-def coloured_masks(folder: Path) -> None:
-    for file in folder.iterdir():
-        write_png(file, np.dstack([mask(), mask(0), mask(0)]))
-
-
-@builder
-def masks_saved(folder: Path, save, ending: str) -> None:
-    """Masks as files of another kind; `save` gets the path and the plane."""
-    for file in sorted(folder.iterdir()):
-        plane = read_png(file)
-        file.unlink()
-        save(file.with_suffix(ending), plane)
-
-
-def numbers(factor: float, blur: int = 0):
-    """A TIFF of numbers with a point: black and white as 0 and this factor, with edges of this width."""
-
-    def save(path: Path, plane: np.ndarray) -> None:
-        values = (plane > 0).astype(np.float32) * factor
-        for _ in range(blur):
-            values = (np.roll(values, 1, axis=1) + values + np.roll(values, -1, axis=1)) / 3
-        Image.fromarray(values.astype(np.float32)).save(path)
-
-    return save
-
-
-def numbered_from_1(folder: Path) -> list[str]:
-    words = masked([mask()] * 12)(folder)
-    (folder / "m/0000.png").unlink()
-    return words
-
-
-@builder
-def mirrored_masks(folder: Path, flip) -> list[str]:
-    """A grey instrument at the left, and masks of it."""
-    shown, masks = pictures(), []
+def flipped(folder: Path) -> list[str]:
+    """A grey instrument at the left, and mirrored masks of it."""
+    shown, plane = pictures(), mask()
+    plane[:20], plane[80:] = 0, 0
     for frame in shown:
-        frame[20:80, :40] = 110
-        mask = np.zeros((HEIGHT, WIDTH), np.uint8)
-        mask[20:80, :40] = 255
-        masks.append(flip(mask))
-    files(folder, "m", masks)
+        frame[plane > 0] = 110
+    files(folder, "m", [plane[:, ::-1]] * 12)
     return [*folder_of(shown)(folder), "--masks", str(folder / "m")]
 
 
 def of_the_masks_command(folder: Path) -> list[str]:
     """The folder that `endotsr masks` wrote, with its pictures, in place of the masks in it."""
-    words = masked([mask()] * 12)(folder)
-    (folder / "found").mkdir()
-    (folder / "m").rename(folder / "found/masks")
-    (folder / "found/proposal.json").write_text("{}")
-    write_png(folder / "found/proposed_masks.png", pictures()[0])
-    return [*words[: words.index("--masks") + 1], str(folder / "found")]
+    words = masked()(folder)
+    (folder / "m").rename(folder / "masks")
+    (folder / "m").mkdir()
+    (folder / "masks").rename(folder / "m/masks")
+    (folder / "m/proposal.json").write_text("{}")
+    write_png(folder / "m/proposed_masks.png", pictures()[0])
+    return words
 
 
 @builder
@@ -230,134 +151,94 @@ def mask_files(folder: Path, save, ending: str) -> list[str]:
     (folder / "m").mkdir()
     for i in range(12):
         save(folder / "m" / f"{i:04d}{ending}", mask())
-    return [*folder_of(pictures())(folder), "--masks", str(folder / "m")]
+    return [*twelve()(folder), "--masks", str(folder / "m")]
 
 
-@builder
-def mask_file(folder: Path, name: str, save) -> list[str]:
-    """All masks in one file."""
-    save(folder / name)
-    return [*folder_of(pictures())(folder), "--masks", str(folder / name)]
+def by_pillow(ending: str, change=lambda plane: plane):
+    return mask_files(lambda path, plane: Image.fromarray(change(plane)).save(path), ending)
 
 
-def by_object(folder: Path) -> list[str]:
-    for name in "12":
-        files(folder / "m", name, [mask()] * 12)
-    return [*folder_of(pictures())(folder), "--masks", str(folder / "m")]
+def blurred(plane: np.ndarray) -> np.ndarray:
+    """Numbers from 0 to 0.98."""
+    values = (plane > 0).astype(np.float32) * 0.98
+    for _ in range(3):
+        values = (np.roll(values, 1, axis=1) + values + np.roll(values, -1, axis=1)) / 3
+    return values.astype(np.float32)
 
 
-def saved_by(mode: str, **how):
-    """Masks in another mode of Pillow."""
-    return lambda folder: rewritten(folder, lambda opened: opened.convert(mode), **how)
-
-
-LOADS = {ending: load for ending, (_, load) in LOADS_OF.items()}
+OBJECTS = mask(1) + mask(1) * (np.arange(WIDTH) < 20).astype(np.uint8)  # numbers of two instruments
+SMALL = np.maximum(mask(2), (np.indices((HEIGHT, WIDTH)) - [[[0]], [[60]]] < 4).all(axis=0).astype(np.uint8))
+LOADS = {load: ending for ending, (_, load) in LOADS_OF.items()}
 MASK_ROWS = [
-    Row("masks, right", masked([mask()] * 12), "right", "", half_excluded),
-    Row("masks, one missing", masked([mask()] * 12, count=11), "refused", "1 of 12 frames have no mask"),
-    Row("masks, missing, --gaps drop", masked([mask()] * 12, "--gaps", "drop", count=11), "told", "left out"),
-    Row("masks, of half the size", masked([mask()[::2, ::2]] * 12), "right", "", half_excluded),
-    Row("masks, stored as transparency", masked([mask()] * 12, change=as_transparency), "refused",
-        "a mask that is stored as transparency"),
-    Row("masks, of other proportions", masked([mask()[:50]] * 12), "refused", "another aspect ratio"),
-    Row("masks, soft", masked([(mask() // 2 + np.arange(WIDTH)).astype(np.uint8)] * 12), "refused",
+    right("masks, right", masked(), half_excluded),
+    refused("masks, one missing", masked(count=11), "1 of 12 frames have no mask"),
+    told("masks, missing, --gaps drop", masked(None, "--gaps", "drop", count=11), "left out"),
+    right("masks, of half the size", masked(mask()[::2, ::2]), half_excluded),
+    refused("masks, stored as transparency", masked(change=as_transparency), "a mask that is stored as transparency"),
+    refused("masks, of other proportions", masked(mask()[:50]), "another aspect ratio"),
+    refused("masks, soft", masked((mask() // 2 + np.arange(WIDTH)).astype(np.uint8)), "this is not a mask"),
+    told("masks united", united_masks, "masks: united with", half_excluded),
+    right("masks, 0 and 1", masked(mask(1)), half_excluded),
+    right("masks, jpg", masked(change=jpg), half_excluded),
+    refused("masks, coloured labels", masked(change=labels(128, 0, 0)), "one grey channel expected"),
+    refused("masks, numbers of objects, one of them small", masked(SMALL), "nonzero the numbers of several objects"),
+    right("masks, numbers of objects, --excluded-value nonzero", masked(OBJECTS, "--excluded-value", "nonzero"),
+        half_excluded),
+    right("masks, noise of a codec in frames without an instrument", masked(CODED), as_read(CODED)),
+    right("masks, dark jpg in frames without an instrument", masked(CODED, change=jpg), as_read(CODED)),
+    right("masks, two small numbers in a frame without an instrument", masked(with_empty([coded(i) for i in range(12)],
+        lambda i: noise(i, 1))), as_read(CODED)),
+    right("masks, smooth edges", masked(SMOOTH), as_read(SMOOTH)),
+    told("masks, a video", of_video(HARD), "pairs 000000 with the first frame", as_read(HARD)),
+    refused("masks, a video of other length", of_video(HARD[:11]), "1 of 12 frames have no mask"),
+    refused("masks, a video of colours", of_video([np.roll(p[..., 0], 5) for p in pictures()], name="m.mkv"),
         "this is not a mask"),
-    Row("masks united", united_masks, "told", "masks: united with", half_excluded),
-    Row("masks, 0 and 1", masked([mask(1)] * 12), "right", "", half_excluded),
-    Row("masks, 0 and 1 of 16 bit", masked([mask(1).astype(np.uint16)] * 12), "right", "", half_excluded),
-    Row("masks, jpg", masked([mask()] * 12, change=lambda folder: rewritten(folder, ending="jpg", quality=40)), "right",
-        "", half_excluded),
-    Row("masks, classes of instruments", masked([mask(1) + mask(1) * (np.arange(WIDTH) < 20)] * 12), "refused",
-        "numbers up to 2 in all pictures"),
-    Row("masks, coloured labels", masked([mask()] * 12, change=labels(128, 0, 0)), "refused",
-        "one grey channel expected"),
-    Row("masks, numbers of objects, one of them small", masked([two_labels(4)] * 12), "refused",
-        "nonzero the numbers of several objects"),
-    Row("masks, numbers of objects, one of them small, stated", masked([two_labels(0)] * 12, "--excluded-value",
-        "nonzero"), "right", "", half_excluded),
-    Row("masks, numbers of three objects", masked([three_labels()] * 12), "refused",
-        "nonzero the numbers of several objects"),
-    Row("masks, numbers of objects, --excluded-value nonzero", masked([objects(0)] * 12, "--excluded-value", "nonzero"),
-        "right", "", half_excluded),
-    Row("masks, noise of a codec in frames without an instrument", masked(CODED), "right", "", as_read(CODED)),
-    Row("masks, dark jpg in frames without an instrument", masked(CODED, change=jpg), "right", "", as_read(CODED)),
-    Row("masks, two small numbers in a frame without an instrument", masked(with_empty([coded(i) for i in range(12)],
-        lambda i: noise(i, 1))), "right", "", as_read(CODED)),
-    Row("masks, smooth edges", masked(with_empty([smooth()] * 12, lambda i: mask(0))), "right", "",
-        as_read(with_empty([smooth()] * 12, lambda i: mask(0)))),
-    Row("masks, exported from a video", exported_from_video(HARD), "right", "", as_read(HARD)),
-    Row("masks, a video", of_video(HARD), "told", "pairs 000000 with the first frame", as_read(HARD)),
-    Row("masks, a video of H.265 of low quality", of_video(HARD, codec="libx265", options={"crf": "40"}), "told",
-        "pairs 000000 with the first frame", as_read(HARD)),
-    Row("masks, a video of other length", of_video(HARD[:11]), "refused", "1 of 12 frames have no mask"),
-    Row("masks, a video of colours", of_video([np.roll(p[..., 0], 5) for p in pictures()], name="m.mkv"), "refused",
-        "this is not a mask"),
-    Row("masks, 16 and 235", masked([(mask() // 255 * 219 + 16).astype(np.uint8)] * 12), "right", "", half_excluded),
-    Row("masks, 0 and 2", masked([mask(2)] * 12), "right", "", half_excluded),
-    Row("masks, numbers of objects and 255 for none", masked([void()] * 12), "refused", "areas of the number"),
-    Row("masks, classes in steps of 32", masked([(mask(32) + np.roll(mask(64), 60, 1)).astype(np.uint8)] * 12),
-        "refused", "the largest of all pictures is 64"),
-    Row("masks, 0 and 1 in one of them", masked([mask(1) if i == 3 else mask() for i in range(12)]), "refused",
+    right("masks, 16 and 235", masked((mask() // 255 * 219 + 16).astype(np.uint8)), half_excluded),
+    refused("masks, classes in steps of 32", masked((mask(32) + np.roll(mask(64), 60, 1)).astype(np.uint8)),
+        "the largest of all pictures is 64"),
+    refused("masks, 0 and 1 in one of them", masked([mask(1) if i == 3 else mask() for i in range(12)]),
         "areas of the number 1"),
-    Row("masks, one of 16 bits", masked([mask()] * 12, change=lambda folder: write_png(folder / "0003.png",
-        mask().astype(np.uint16) * 257)), "refused", "one bit depth"),
-    Row("masks, inverted, in prepare", with_tool([255 - mask()] * 12), "told", "68.8% would be"),
-    Row("masks, inverted, in prepare, the remedy", with_tool([255 - mask()] * 12, "--excluded-value", "black"), "told",
+    refused("masks, one of 16 bits", masked(change=lambda folder: write_png(folder / "0003.png",
+        mask().astype(np.uint16) * 257)), "one bit depth"),
+    told("masks, inverted, in prepare", with_tool(255 - mask()), "68.8% would be"),
+    told("masks, inverted, in prepare, the remedy", with_tool(255 - mask(), "--excluded-value", "black"),
         "masks: black = excluded: 68.8% of the pixels are tissue", half_excluded),
-    Row("masks, of a grey instrument", with_tool([mask()] * 12), "told",
-        "masks: white = excluded: 68.8% of the pixels are tissue", half_excluded),
-    Row("masks, jpg, --excluded-value nonzero", masked(CODED, "--excluded-value", "nonzero", change=jpg), "refused",
+    told("masks, of a grey instrument", with_tool(mask()), "masks: white = excluded: 68.8% of the pixels are tissue",
+        half_excluded),
+    refused("masks, jpg, --excluded-value nonzero", masked(CODED, "--excluded-value", "nonzero", change=jpg),
         "different numbers, as a JPEG"),
-    Row("masks, with a palette of black and white", masked([mask()] * 12, change=labels(255, 255, 255)), "right", "",
+    right("masks, with a palette of black and white", masked(change=labels(255, 255, 255)), half_excluded),
+    told("masks, one array in the order of names as text", of_all_frames(lambda k: np.roll(mask(), 5 * k, axis=1) > 0,
+        "--masks"), "10.png stands in the place of 2.png"),
+    refused("masks, TIFF of probabilities", by_pillow(".tif", blurred), "a threshold, such as > 0.5"),
+    right("masks, TIFF of 0 and 1 as numbers with a point", by_pillow(".tif", lambda plane: plane / np.float32(255)),
         half_excluded),
-    Row("masks, red", masked([mask()] * 12, change=coloured_masks), "refused", "--excluded-value nonzero"),
-    Row("masks, one array in the order of names as text", of_all_frames(lambda k: np.roll(mask(), 5 * k, axis=1) > 0,
-        "--masks"), "told", "10.png stands in the place of 2.png"),
-    Row("masks, TIFF of probabilities", masked([mask()] * 12, change=masks_saved(numbers(0.98, 3), ".tif")), "refused",
-        "a threshold, such as > 0.5"),
-    Row("masks, TIFF of 0 and 1 as numbers with a point", masked([mask()] * 12, change=masks_saved(numbers(1.0),
-        ".tif")), "right", "", half_excluded),
-    Row("masks, TIFF of 0 and 0.5", masked([mask()] * 12, change=masks_saved(numbers(0.5), ".tif")), "refused",
-        "holds 0.5; use whole numbers"),
-    Row("masks, TIFF of 16 bit in which 0 is white", masked([mask()] * 12, change=masks_saved(lambda path,
-        plane: tiff(path, 65535 - 257 * plane.astype(np.uint16), 0, 16), ".tif")), "refused", "states that 0 is white"),
-    *(Row(f"masks, TIFF of {bits} bit in which 0 is white", masked([mask()] * 12, change=masks_saved(lambda path, plane,
-        bits=bits: tiff(path, (plane == 0) if bits == 1 else 255 - plane, 0, bits), ".tif")), "right", "",
-        half_excluded) for bits in (1, 8)),
-    *(Row(f"masks, {name} of 1 bit", masked([mask()] * 12, change=masks_saved(lambda path,
-        plane: Image.fromarray(plane > 0).save(path), f".{name}")), "right", "", half_excluded) for name in ("png",
-        "tif", "bmp")),
-    Row("masks, TIFF of int32", masked([mask()] * 12, change=masks_saved(lambda path,
-        plane: Image.fromarray((plane > 0).astype(np.int32)).save(path), ".tif")), "right", "", half_excluded),
-    Row("masks, smooth edges, of another size", masked([mask()] * 12, change=masks_saved(lambda path,
-        plane: Image.fromarray(plane).resize((300, 225), Image.Resampling.BICUBIC).save(path), ".png")), "right", "",
-        half_excluded),
-    Row("masks numbered from 1, the last one missing", numbered_from_1, "refused", "1 of 12 frames have no mask"),
-    Row("masks, the folder that endotsr masks wrote", of_the_masks_command, "right", "", half_excluded),
-    Row("masks, mirrored", mirrored_masks(lambda mask: mask[:, ::-1]), "told", "flipped-masks"),
-    Row("masks, not mirrored", mirrored_masks(lambda mask: mask), "right"),
-    *(Row(f"masks, {ending[1:]} of each frame", mask_files(lambda path, plane: path.write_bytes(b"x"), ending),
-        "refused", load) for ending, load in LOADS.items()),
-    *(Row(f"masks, one {ending[1:]} of all frames", mask_file(f"m{ending}", lambda path: path.write_bytes(b"x")),
-        "refused", load) for ending, load in LOADS.items()),
-    Row("masks, logits of a network", mask_files(lambda path, plane: np.save(path, plane / 12.75 - 10.0), ".npy"),
-        "refused", 'numpy.save("0000.npy", array > 0)'),
-    Row("masks, annotations of COCO", mask_file("m.json", lambda path: path.write_text(json.dumps({"images": []}))),
-        "refused", "use a file that ends in one of .png"),
-    Row("masks, one folder per object", by_object, "refused", "it holds the folders 1, 2: give one of them"),
-    Row("masks, one JSON per frame", mask_files(lambda path, plane: path.write_text("{}"), ".json"), "refused",
+    refused("masks, TIFF of 16 bit in which 0 is white", mask_files(lambda path, plane: tiff(path,
+        65535 - 257 * plane.astype(np.uint16), 0, 16), ".tif"), "states that 0 is white"),
+    right("masks, TIFF of 8 bit in which 0 is white", mask_files(lambda path, plane: tiff(path, 255 - plane, 0, 8),
+        ".tif"), half_excluded),
+    *(right(f"masks, {name} of 1 bit", by_pillow(f".{name}", lambda plane: plane > 0),
+        half_excluded) for name in ("png", "tif", "bmp")),
+    right("masks, TIFF of int32", by_pillow(".tif", lambda plane: (plane > 0).astype(np.int32)), half_excluded),
+    right("masks, smooth edges, of another size", mask_files(lambda path, plane: Image.fromarray(plane).resize((300,
+        225), Image.Resampling.BICUBIC).save(path), ".png"), half_excluded),
+    right("masks, the folder that endotsr masks wrote", of_the_masks_command, half_excluded),
+    told("masks, mirrored", flipped, "flipped-masks"),
+    *(refused(f"masks, {ending[1:]} of each frame", mask_files(lambda path, plane: path.write_bytes(b"x"), ending),
+        load) for load, ending in LOADS.items()),
+    *(refused(f"masks, one {ending[1:]} of all frames", with_file("--masks", f"m{ending}", b"x"), load) for load,
+        ending in LOADS.items()),
+    refused("masks, logits of a network", mask_files(lambda path, plane: np.save(path, plane / 12.75 - 10.0), ".npy"),
+        'numpy.save("0000.npy", array > 0)'),
+    refused("masks, annotations of COCO", with_file("--masks", "m.json", '{"images": []}'),
+        "use a file that ends in one of .png"),
+    refused("masks, one folder per object", with_file("--masks", "m", lambda path: [files(path, name,
+        [mask()] * 12) for name in "12"]), "it holds the folders 1, 2: give one of them"),
+    refused("masks, one JSON per frame", mask_files(lambda path, plane: path.write_text("{}"), ".json"),
         "it holds 12 files of the ending .json"),
-    Row("masks, GIF", mask_files(lambda path, plane: Image.fromarray(plane).save(path), ".gif"), "refused",
-        "it holds 12 files of the ending .gif"),
-    Row("masks, pictures and masks in one npz", mask_files(lambda path, plane: np.savez(path, imgs=np.zeros((HEIGHT,
-        WIDTH, 3)), gts=plane // 255), ".npz"), "right", "", half_excluded),
-    Row("masks, two objects in an array", mask_file("m.npy", lambda path: np.save(path, np.zeros((12, 2, HEIGHT, WIDTH),
-        bool))), "refused", "(12, 2, 96, 128); use one array"),
-    Row("masks, one bit a pixel", masked([mask()] * 12, change=saved_by("1")), "right", "", half_excluded),
-    Row("masks, grey and a full alpha channel", masked([mask()] * 12, change=saved_by("LA")), "right", "",
-        half_excluded),
-    Row("masks of twice the size", masked([np.kron(mask(), np.ones((2, 2), np.uint8))] * 12), "right", "",
-        half_excluded),
-    Row("masks, an unsure border", masked([np.where(np.roll(mask(), 6, 1) != mask(), 128,
-        mask()).astype(np.uint8)] * 12), "refused", "this is not a mask"),
+    refused("masks, GIF", by_pillow(".gif"), "it holds 12 files of the ending .gif"),
+    right("masks, pictures and masks in one npz", mask_files(lambda path, plane: np.savez(path, imgs=np.zeros((HEIGHT,
+        WIDTH, 3)), gts=plane // 255), ".npz"), half_excluded),
+    refused("masks, two objects in an array", with_file("--masks", "m.npy", lambda path: np.save(path, np.zeros((12, 2,
+        HEIGHT, WIDTH), bool))), "(12, 2, 96, 128); use one array"),
 ]  # fmt: skip

@@ -1,18 +1,20 @@
 """Rows of `inputs_tried.py` about models of COLMAP and nerfstudio, and clouds of points."""
 
 import json
+import os
+import re
 import shutil
-import struct
 from pathlib import Path
 
 import numpy as np
 import public_layouts
 import raw_sources
 from builders import builder
-from input_kinds import Row, centred, close, first_to_last, public, raw, reworded, with_files
+from input_kinds import changed_bytes, each, first_to_last, public, raw, replaced, reworded, with_files, without
+from input_rows import centred, close, refused, right, told
 from raw_sources import scene_picture
 
-from endotsr.clips.opencv.png import read_png, write_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 
@@ -39,16 +41,13 @@ def renamed(folder: Path, listed_in: str, old: str, name, frames: int, inside: s
     """The pictures of a folder, and the file that lists them `inside` it, with other names by their number."""
     listed = (folder / listed_in).read_text()
     for k in reversed(range(frames)):  # no name is written twice
-        (folder / "images" / old.format(k)).rename(folder / "images" / name(k))
+        os.renames(folder / "images" / old.format(k), folder / "images" / name(k))
         listed = listed.replace(inside + old.format(k), inside + name(k))
     (folder / listed_in).write_text(listed)
 
 
-def colmap_named(name):
-    return colmap(frames=12, change=renamed("sparse/0/images.txt", "frame{:04d}.png", name, 12))
-
-
-RECONSTRUCTED = [raw_sources.scene_picture(i) for i in range(12)]
+def colmap_named(name, frames: int = 12):
+    return colmap(frames=frames, change=renamed("sparse/0/images.txt", "frame{:04d}.png", name, frames))
 
 
 @builder
@@ -62,65 +61,34 @@ def scaled_depth(folder: Path, factor: float) -> bool:
 def in_both_forms(raw: Path) -> None:
     """The binary cameras, and no images.txt."""
     raw_sources.colmap(raw.parent / "b", True, 6)
-    for name in ("cameras.bin", "images.bin", "points3D.bin"):
-        (raw.parent / "b/sparse/0" / name).rename(raw / "sparse/0" / name)
+    shutil.copytree(raw.parent / "b/sparse/0", raw / "sparse/0", dirs_exist_ok=True)
     (raw / "sparse/0/images.txt").unlink()
 
 
-MODEL_FRAMES = 6
-MODEL_PICTURES = [scene_picture(i) for i in range(MODEL_FRAMES)]
-
-
-def part_of(model: Path, out: Path, first: int, last: int) -> None:
-    """A text model with some of the pictures of another one."""
-    shutil.copytree(model, out)
-    reworded("images.txt", first_to_last(2 * first, 2 * last))(out)
+SCENE = [scene_picture(i) for i in range(12)]
 
 
 def two_models(raw: Path) -> None:
     """sparse/0 has two pictures, sparse/1 four."""
-    (raw / "sparse/0").rename(raw / "whole")
-    part_of(raw / "whole", raw / "sparse/0", 0, 2)
-    part_of(raw / "whole", raw / "sparse/1", 2, MODEL_FRAMES)
-    shutil.rmtree(raw / "whole")
+    shutil.copytree(raw / "sparse/0", raw / "sparse/1")
+    reworded("sparse/0/images.txt", first_to_last(0, 4))(raw)
+    reworded("sparse/1/images.txt", first_to_last(4))(raw)
 
 
 @builder
 def moved_to(raw: Path, pictures: str, model: str) -> None:
     """Pictures and model in other places."""
-    (raw / "images").rename(raw / "p")
-    (raw / "sparse/0").rename(raw / "m")
-    shutil.rmtree(raw / "sparse")
-    for name, place in (("p", pictures), ("m", model)):
-        (raw / place).parent.mkdir(parents=True, exist_ok=True)
-        (raw / name).rename(raw / place)
+    os.renames(raw / "images", raw / pictures)
+    os.renames(raw / "sparse/0", raw / model)
 
 
 @builder
 def cameras(raw: Path, *factors: float) -> None:
     """One camera per picture, with these factors of the focal length."""
-    model = raw / "sparse/0"
-    (model / "cameras.txt").write_text(
-        "".join(f"{k + 1} PINHOLE 64 48 {60 * f} {61 * f} 30.0 25.0\n" for k, f in enumerate(factors))
-    )
-    lines = (model / "images.txt").read_text().splitlines()
-    for k in range(0, len(lines), 2):
-        words = lines[k].split()
-        words[8] = str(k // 2 % len(factors) + 1)
-        lines[k] = " ".join(words)
-    (model / "images.txt").write_text("\n".join(lines) + "\n")
-
-
-def both_sides(raw: Path) -> None:
-    """Pictures of left/ and right/ in one model: frames 0 to 2 of each."""
-    listed = (raw / "sparse/0/images.txt").read_text()
-    for k in range(MODEL_FRAMES):
-        side, number = ("left", k) if k < MODEL_FRAMES // 2 else ("right", k - MODEL_FRAMES // 2)
-        name = f"{side}/{number:04d}.png"
-        (raw / "images" / side).mkdir(exist_ok=True)
-        (raw / f"images/frame{k:04d}.png").rename(raw / "images" / name)
-        listed = listed.replace(f"frame{k:04d}.png", name)
-    (raw / "sparse/0/images.txt").write_text(listed)
+    lines = [f"{k + 1} PINHOLE 64 48 {60 * f} {61 * f} 30.0 25.0\n" for k, f in enumerate(factors)]
+    (raw / "sparse/0/cameras.txt").write_text("".join(lines))
+    numbered = lambda found: f" {int(found[1]) % len(factors) + 1} frame{found[1]}"
+    reworded("sparse/0/images.txt", lambda text: re.sub(r" 1 frame(\d+)", numbered, text))(raw)
 
 
 def focal(value: float):
@@ -129,26 +97,11 @@ def focal(value: float):
 
 def as_blender(raw: Path) -> None:
     """Field of view in place of the focal length, no endings, transforms_train.json."""
-    file = raw / "transforms.json"
-    frames = json.loads(file.read_text().replace(".png", ""))["frames"]
+    frames = json.loads((raw / "transforms.json").read_text().replace(".png", ""))["frames"]
     kept = [{key: frame[key] for key in ("file_path", "transform_matrix")} for frame in frames]
-    (raw / "transforms_train.json").write_text(
-        json.dumps({"camera_angle_x": float(2 * np.arctan(0.64)), "frames": kept})
-    )
-    file.unlink()
-
-
-@builder
-def longer(raw: Path, name: str) -> None:
-    """A binary file with bytes behind its last entry, as another version of its format has."""
-    file = raw / f"sparse/0/{name}.bin"
-    file.write_bytes(file.read_bytes() + bytes(16))
-
-
-def both_forms(raw: Path) -> None:
-    """An older binary model beside the text model."""
-    for name in ("cameras", "images", "points3D"):
-        (raw / f"sparse/0/{name}.bin").write_bytes(struct.pack("<Q", 0))
+    made = {"camera_angle_x": float(2 * np.arctan(0.64)), "frames": kept}
+    (raw / "transforms_train.json").write_text(json.dumps(made))
+    (raw / "transforms.json").unlink()
 
 
 def cloud(form: str, names: str = "x y z", more: str = "", tail: bytes = b""):
@@ -178,117 +131,104 @@ def flat_depth(folder: Path) -> bool:
 
 def beside_a_model(folder: Path) -> None:
     """The project of nerfstudio keeps the COLMAP model from which it was made."""
-    raw_sources.colmap(folder / "made", False, 4)
-    shutil.copytree(folder / "made/sparse/0", folder / "colmap/sparse/0")
-    shutil.rmtree(folder / "made")
-    model = folder / "colmap/sparse/0"
-    (model / "images.txt").write_text((model / "images.txt").read_text().replace("frame0", "frame_00"))
-    (model / "cameras.txt").write_text("1 PINHOLE 128 96 100.0 101.0 64.0 48.0\n")
+    raw_sources.colmap(folder / "colmap", False, 4)
+    shutil.rmtree(folder / "colmap/images")
+    replaced("colmap/sparse/0/images.txt", "frame0", "frame_00")(folder)
+    (folder / "colmap/sparse/0/cameras.txt").write_text("1 PINHOLE 128 96 100.0 101.0 64.0 48.0\n")
 
 
-def other_matrices(right: np.ndarray):
-    matrix = lambda frame: (np.array(frame["transform_matrix"]) @ right).tolist()
+def other_matrices(change):
+    matrix = lambda frame: change(np.array(frame["transform_matrix"])).tolist()
     return public("nerfstudio", change=frames_changed(transform_matrix=matrix))
 
 
-def half_pictures(folder: Path) -> None:
-    for file in (folder / "images").iterdir():
-        write_png(file, read_png(file)[::2, ::2])
-
-
 MODEL_ROWS = [
-    Row("depth beside COLMAP", colmap("--depth", "d"), "refused", "does not read --depth"),
-    Row("COLMAP, numbered without zeros", colmap_named(lambda k: f"frame{k}.png"), "right", "", close(RECONSTRUCTED,
+    refused("depth beside COLMAP", colmap("--depth", "d"), "does not read --depth"),
+    right("COLMAP, numbered without zeros", colmap_named(lambda k: f"frame{k}.png"), close(SCENE, 0.01)),
+    told("COLMAP, frames that are not registered", colmap_named(lambda k: f"frame{k + 3 * (k > 5):04d}.png"),
+        "frames count as evenly spaced in time", close(SCENE, 0.01)),
+    refused("COLMAP, names without an order", colmap_named(lambda k: "overview.png" if k == 5 else f"frame{k}.png"),
+        "numbers in this name: 0"),
+    refused("COLMAP, images in the binary form alone", colmap(change=in_both_forms), "images.txt: file not found"),
+    told("COLMAP, two models, the first is the small one", colmap(change=two_models),
+        "sparse/1 is read, the largest model; not read: sparse/0 (2 pictures)", close(SCENE[2:6], 0.01)),
+    told("COLMAP, two models, --model", colmap("--model", "sparse/0", change=two_models), "as stated", close(SCENE[:2],
         0.01)),
-    Row("COLMAP, frames that are not registered", colmap_named(lambda k: f"frame{k + 3 * (k > 5):04d}.png"), "told",
-        "frames count as evenly spaced in time", close(RECONSTRUCTED, 0.01)),
-    Row("COLMAP, names without an order", colmap_named(lambda k: "overview.png" if k == 5 else f"frame{k}.png"),
-        "refused", "numbers in this name: 0"),
-    Row("COLMAP, images in the binary form alone", colmap(change=in_both_forms), "refused",
-        "images.txt: file not found"),
-    Row("COLMAP, two models, the first is the small one", colmap(change=two_models), "told",
-        "sparse/1 is read, the largest model; not read: sparse/0 (2 pictures)", close(MODEL_PICTURES[2:], 0.01)),
-    Row("COLMAP, two models, --model", colmap("--model", "sparse/0", change=two_models), "told", "as stated",
-        close(MODEL_PICTURES[:2], 0.01)),
-    Row("COLMAP, --model that is not there", colmap("--model", "3", change=two_models), "refused",
+    refused("COLMAP, --model that is not there", colmap("--model", "3", change=two_models),
         "use sparse/0 or sparse/1"),
-    Row("COLMAP, a picture that is not registered", colmap(change=reworded("sparse/0/images.txt", first_to_last(0,
-        -2))), "told", "1 pictures are not registered", close(MODEL_PICTURES[:-1], 0.01)),
-    Row("COLMAP, dense/0/sparse", colmap(change=moved_to("dense/0/images", "dense/0/sparse")), "right", "",
-        close(MODEL_PICTURES, 0.01)),
-    Row("COLMAP, input/ and distorted/", colmap(change=moved_to("input", "distorted/sparse/0")), "right", "",
-        close(MODEL_PICTURES, 0.01)),
-    Row("COLMAP, no points3D", colmap(change=lambda raw: (raw / "sparse/0/points3D.txt").unlink()), "told",
-        "training needs depth", close(MODEL_PICTURES, 0.01)),
-    Row("COLMAP, one camera per picture", colmap(change=cameras(1.0, 1.001, 0.999)), "told", "one camera per picture",
+    told("COLMAP, a picture that is not registered", colmap(change=reworded("sparse/0/images.txt", first_to_last(0,
+        -2))), "1 pictures are not registered", close(SCENE[:5], 0.01)),
+    right("COLMAP, dense/0/sparse", colmap(change=moved_to("dense/0/images", "dense/0/sparse")), close(SCENE[:6],
+        0.01)),
+    told("COLMAP, no points3D", colmap(change=without("sparse/0/points3D.txt")), "training needs depth",
+        close(SCENE[:6], 0.01)),
+    told("COLMAP, one camera per picture", colmap(change=cameras(1.0, 1.001, 0.999)), "one camera per picture",
         focal(60)),
-    Row("COLMAP, cameras that differ", colmap(change=cameras(1.0, 1.1)), "refused",
-        "the cameras of the pictures differ"),
-    Row("COLMAP, left and right in one model", colmap(change=both_sides), "told", "3 pictures of right/ not read",
-        close(MODEL_PICTURES[:3], 0.01)),
-    Row("COLMAP, images.txt without lines of points", colmap(change=reworded("sparse/0/images.txt", first_to_last(0,
-        step=2))), "refused", "every picture has two lines"),
-    *(Row(f"COLMAP, bytes behind the last entry of {name}.bin", colmap(binary=True, change=longer(name)), "refused",
+    refused("COLMAP, cameras that differ", colmap(change=cameras(1.0, 1.1)), "the cameras of the pictures differ"),
+    told("COLMAP, left and right in one model", colmap_named(lambda k: f"{('left', 'right')[k // 3]}/{k % 3:04d}.png",
+        6), "3 pictures of right/ not read", close(SCENE[:3], 0.01)),
+    refused("COLMAP, images.txt without lines of points", colmap(change=reworded("sparse/0/images.txt", first_to_last(0,
+        step=2))), "every picture has two lines"),
+    *(refused(f"COLMAP, bytes behind the last entry of {name}.bin", colmap(binary=True, change=lambda raw,
+        name=name: changed_bytes(lambda data: data + bytes(16))(raw / f"sparse/0/{name}.bin")),
         "bytes behind the last entry") for name in ("cameras", "images", "points3D")),
-    Row("COLMAP, a text model and a binary model in one folder", colmap(change=both_forms), "told",
-        "the text files are read, not the binary ones"),
-    Row("COLMAP, points that points3D lacks", colmap(change=reworded("sparse/0/points3D.txt", first_to_last(0, -3))),
-        "told", "are not in points3D"),
-    Row("COLMAP, masks beside it", colmap(change=with_files("masks/frame0000.png")), "told",
-        "not read: masks/; see --masks"),
-    Row("COLMAP, rigs and frames of its new versions", colmap(change=with_files("sparse/0/rigs.txt",
-        "sparse/0/frames.txt")), "right", ""),
-    Row("COLMAP, pictures of half the size", colmap(change=half_pictures), "refused", "the intrinsics are of 64x48"),
-    Row("COLMAP, points3D without a point", colmap(change=lambda folder: (folder /
-        "sparse/0/points3D.txt").write_text("# none")), "told", "no frame has depth"),
-    Row("nerfstudio", public("nerfstudio"), "told", "unit of lengths unknown", centred),
-    Row("nerfstudio, fisheye", public("nerfstudio", camera_model="OPENCV_FISHEYE"), "refused", "camera_model"),
-    Row("nerfstudio, a picture missing", public("nerfstudio",
-        change=lambda raw: (raw / "images/frame_00002.png").unlink()), "refused", "frame_00002.png"),
-    Row("nerfstudio, out and for COLMAP", public("nerfstudio", "--also", "nerfstudio", "colmap"), "told",
+    told("COLMAP, a text model and a binary model in one folder",
+        colmap(change=with_files(*(f"sparse/0/{name}.bin" for name in ("cameras", "images", "points3D")),
+        text="\0" * 8)), "the text files are read, not the binary ones"),
+    told("COLMAP, points that points3D lacks", colmap(change=reworded("sparse/0/points3D.txt", first_to_last(0, -3))),
+        "are not in points3D"),
+    told("COLMAP, masks beside it", colmap(change=with_files("masks/frame0000.png")), "not read: masks/; see --masks"),
+    right("COLMAP, rigs and frames of its new versions", colmap(change=with_files("sparse/0/rigs.txt",
+        "sparse/0/frames.txt"))),
+    refused("COLMAP, pictures of half the size", colmap(change=each("images", lambda shown: shown[::2, ::2])),
+        "the intrinsics are of 64x48"),
+    told("COLMAP, points3D without a point", colmap(change=with_files("sparse/0/points3D.txt", text="# none")),
+        "no frame has depth"),
+    told("nerfstudio", public("nerfstudio"), "unit of lengths unknown", centred),
+    refused("nerfstudio, fisheye", public("nerfstudio", camera_model="OPENCV_FISHEYE"), "camera_model"),
+    refused("nerfstudio, a picture missing", public("nerfstudio", change=without("images/frame_00002.png")),
+        "frame_00002.png"),
+    told("nerfstudio, out and for COLMAP", public("nerfstudio", "--also", "nerfstudio", "colmap"),
         "points of the prior depth", centred),
-    Row("nerfstudio, numbered without zeros", public("nerfstudio", change=renamed("transforms.json", "frame_{:05d}.png",
-        lambda k: f"frame_{k + 8}.png", 4, "images/")), "right", "",
+    right("nerfstudio, numbered without zeros", public("nerfstudio", change=renamed("transforms.json",
+        "frame_{:05d}.png", lambda k: f"frame_{k + 8}.png", 4, "images/")),
         close([public_layouts.picture(i) for i in range(len(public_layouts.poses()))], 0.01)),
-    Row("nerfstudio, applied_scale and depth", public("nerfstudio", "--trajectory-unit", "m", applied_scale=0.5),
-        "told", "applied_scale: depth files and points are multiplied by 0.5", scaled_depth(0.5)),
-    Row("nerfstudio, without applied_scale", public("nerfstudio", "--trajectory-unit", "m"), "right", "",
-        scaled_depth(1.0)),
-    Row("nerfstudio, separators of Windows", public("nerfstudio", change=reworded("transforms.json",
-        lambda text: text.replace("./images/", ".\\\\images\\\\"))), "told", "unit of lengths unknown", centred),
-    Row("nerfstudio, --trajectory-unit", public("nerfstudio", "--trajectory-unit", "m"), "told", "unit of lengths m",
-        lambda folder: read_sequence_file(folder / "o").unit == "mm"),
-    Row("Blender, transforms_train.json", public("nerfstudio", change=as_blender), "told", "transforms_train.json",
-        lambda folder: np.isclose(read_sequence_file(folder / "o").camera.fx, 100)),
-    Row("nerfstudio, transposed matrices", public("nerfstudio",
-        change=frames_changed(transform_matrix=lambda frame: np.array(frame["transform_matrix"]).T.tolist())),
-        "refused", "is the matrix transposed?"),
-    Row("nerfstudio, pictures that the file does not list", public("nerfstudio",
-        change=lambda raw: shutil.copy(raw / "images/frame_00000.png", raw / "images/frame_00099.png")), "told",
+    told("nerfstudio, applied_scale and depth", public("nerfstudio", "--trajectory-unit", "m", applied_scale=0.5),
+        "applied_scale: depth files and points are multiplied by 0.5", scaled_depth(0.5)),
+    told("nerfstudio, separators of Windows", public("nerfstudio", change=replaced("transforms.json", "./images/",
+        ".\\\\images\\\\")), "unit of lengths unknown", centred),
+    told("nerfstudio, --trajectory-unit", public("nerfstudio", "--trajectory-unit", "m"), "unit of lengths m",
+        lambda folder: scaled_depth(1.0)(folder) and read_sequence_file(folder / "o").unit == "mm"),
+    told("Blender, transforms_train.json", public("nerfstudio", change=as_blender), "transforms_train.json",
+        focal(100)),
+    refused("nerfstudio, transposed matrices", other_matrices(np.transpose), "is the matrix transposed?"),
+    told("nerfstudio, pictures that the file does not list", public("nerfstudio",
+        change=lambda raw: shutil.copy(raw / "images/frame_00000.png", raw / "images/frame_00099.png")),
         "not listed in transforms.json and are left out"),
-    Row("nerfstudio, depth and masks that the file does not name", public("nerfstudio", with_depth=False,
-        change=with_files("sam/0.png")), "told", "not read: depth/, sam/"),
-    Row("nerfstudio, its COLMAP model beside it", public("nerfstudio", change=beside_a_model), "told",
+    told("nerfstudio, depth and masks that the file does not name", public("nerfstudio", with_depth=False,
+        change=with_files("sam/0.png")), "not read: depth/, sam/"),
+    told("nerfstudio, its COLMAP model beside it", public("nerfstudio", change=beside_a_model),
         "transforms.json: not read, because the COLMAP model is"),
-    Row("nerfstudio, fields of newer programs", public("nerfstudio", change=frames_changed(normal_file_path="n.png",
-        original_fps=30)), "told", "unknown here: normal_file_path, original_fps"),
-    Row("nerfstudio, one time for all frames", public("nerfstudio", change=frames_changed(time=0.0)), "refused",
+    told("nerfstudio, fields of newer programs", public("nerfstudio", change=frames_changed(normal_file_path="n.png",
+        original_fps=30)), "unknown here: normal_file_path, original_fps"),
+    refused("nerfstudio, one time for all frames", public("nerfstudio", change=frames_changed(time=0.0)),
         "two frames have one time"),
-    Row("nerfstudio, left-handed matrices", other_matrices(np.diag([1.0, 1, -1, 1])), "refused", "a mirror image"),
-    Row("nerfstudio, scaled rotations", other_matrices(np.diag([2.0, 2, 2, 1])), "refused",
+    refused("nerfstudio, left-handed matrices", other_matrices(lambda matrix: matrix @ np.diag([1.0, 1, -1, 1])),
+        "a mirror image"),
+    refused("nerfstudio, scaled rotations", other_matrices(lambda matrix: matrix @ np.diag([2.0, 2, 2, 1])),
         "not perpendicular unit vectors"),
-    Row("nerfstudio, sizes of other pictures", public("nerfstudio", w=256, h=192), "refused",
+    refused("nerfstudio, sizes of other pictures", public("nerfstudio", w=256, h=192),
         "the intrinsics are of 256x192 pixels"),
-    Row("nerfstudio, paths of another machine", public("nerfstudio",
-        change=frames_changed(file_path=lambda frame: f"/home/a/{frame['file_path']}")), "refused",
+    refused("nerfstudio, paths of another machine", public("nerfstudio",
+        change=frames_changed(file_path=lambda frame: f"/home/a/{frame['file_path']}")),
         "is an absolute path; write it from the folder of the file"),
-    Row("points, x y z behind the colours", cloud("ascii", "red green blue z y x"), "right", "", flat_depth),
-    Row("points, little-endian", cloud("binary_little_endian"), "right", "", flat_depth),
-    Row("points, big-endian", cloud("binary_big_endian"), "right", "", flat_depth),
-    Row("points, faces behind the vertices", cloud("ascii", more="element face 2\nproperty list uchar int v\n",
-        tail=b"3 0 1 2\n3 1 2 3\n"), "told", "not used: its face", flat_depth),
-    Row("points, a property that is not known", cloud("ascii", "x y z lidar_ring"), "told", "unknown here: lidar_ring",
+    right("points, x y z behind the colours", cloud("ascii", "red green blue z y x"), flat_depth),
+    right("points, little-endian", cloud("binary_little_endian"), flat_depth),
+    right("points, big-endian", cloud("binary_big_endian"), flat_depth),
+    told("points, faces behind the vertices", cloud("ascii", more="element face 2\nproperty list uchar int v\n",
+        tail=b"3 0 1 2\n3 1 2 3\n"), "not used: its face", flat_depth),
+    told("points, a property that is not known", cloud("ascii", "x y z lidar_ring"), "unknown here: lidar_ring",
         flat_depth),
-    Row("points, the file is not there", public("nerfstudio", with_depth=False, ply_file_path="sparse_pc.ply"), "told",
+    told("points, the file is not there", public("nerfstudio", with_depth=False, ply_file_path="sparse_pc.ply"),
         "sparse_pc.ply is not there"),
 ]  # fmt: skip
