@@ -379,7 +379,7 @@ def lengthened(config: Config, training_frames: int) -> Config:
     return with_iterations(config, wanted) if wanted > config.training.iterations else with_fixed_length(config)
 
 
-SHARP = Config(
+_FOLLOWING = Config(  # common to `sharp`, `quick` and `demo`: Gaussians that follow the tissue from the start
     preset="sharp",
     sequence=SequenceConfig(depth_outliers="removed"),
     model=ModelConfig(initial_width=0.05),
@@ -389,20 +389,22 @@ SHARP = Config(
     initialisation=InitialisationConfig(motion="flow"),
     training=TrainingConfig(bridge_fraction=0.7),
 )
-SHARP = with_settings(with_iterations(SHARP, 3000), training={"visits_per_frame": 72})
-# 1.5 to 3 times those of `sharp`: docs/specification/rulings.md, "Presets of a run"
-QUICK_RATES = {"position": 3.2e-3, "deformation": 2.4e-3, "harmonics_base": 5e-3, "scale": 0.01, "rotation": 0.003}
+SHARP = with_settings(
+    with_iterations(_FOLLOWING, 3000),
+    # 1.5 to 3 times those of `paper`: docs/specification/rulings.md, "Presets of a run"
+    optimiser={"position": 3.2e-3, "deformation": 2.4e-3, "harmonics_base": 5e-3, "scale": 0.01, "rotation": 0.003},
+    training={"visits_per_frame": 72},
+)
 QUICK = with_settings(
     with_iterations(SHARP, 1600),
     preset="quick",
     # affordable for a first look at 640x512 pixels
     density={"growth": "budget", "maximum": 22_000},
     initialisation={"first_frame_points": 14_000, "other_frame_points": 2_000},
-    optimiser=QUICK_RATES,
     training={"coarse_start": True, "visits_per_frame": 29},  # 1600 iterations up to 55 training frames
 )
 DEMO = with_settings(
-    with_iterations(SHARP, 1500),
+    with_iterations(_FOLLOWING, 1500),
     preset="demo",
     # points and threshold suit its 160x128 pixels
     density={"gradient_threshold": 7e-4},

@@ -1,9 +1,8 @@
 """Settings for a given training time: length, points and Gaussians grow together.
 
 On the settings of `sharp`, `paced(x)` is the preset `quick` at x = 0, and at x = 1 `sharp` on 55 training frames with
-growth to a budget. The length is geometric in x, and up to x = 1 the numbers of points and Gaussians are too. From
-x = 0 to x = 1 the learning rates of `quick` fall to those of `sharp`. The speed of the machine is measured on the clip
-itself, with a few iterations of a model without motion.
+growth to a budget. The length is geometric in x, and up to x = 1 the numbers of points and Gaussians are too. The speed
+of the machine is measured on the clip itself, with a few iterations of a model without motion.
 """
 
 import statistics
@@ -12,7 +11,7 @@ import time
 from endotsr.clips.sequences.forecast.seconds import TimedCommand, estimated_seconds, frames_of, vector_factor
 from endotsr.clips.sequences.forecast.work import iteration_work
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.config import QUICK, QUICK_RATES, SHARP, Config, lengthened, with_iterations, with_settings
+from endotsr.config import QUICK, SHARP, Config, lengthened, with_iterations, with_settings
 from endotsr.errors import InputError
 from endotsr.training.fitting.state import new_training, training_constants
 from endotsr.training.fitting.trainer import training_step
@@ -28,10 +27,7 @@ PLAIN = 0.76
 
 
 def paced(config: Config, x: float) -> Config:
-    """The settings with the length, points, Gaussian budget and learning rates of x; other settings are unchanged.
-
-    Edges:   a rate that differs from that of `sharp` was chosen by somebody and stays
-    """
+    """The settings with the length, points and Gaussian budget of x; other settings are unchanged."""
 
     def between(low: int, high: int, at: float) -> int:
         return max(1, round(low * (high / low) ** at))
@@ -44,17 +40,7 @@ def paced(config: Config, x: float) -> Config:
         for name in ("first_frame_points", "other_frame_points")
     }
     density, training = {"growth": "budget", "maximum": maximum}, {"coarse_start": x <= COARSE_BELOW}
-    return with_settings(timed, density=density, initialisation=points, training=training, optimiser=_rates(config, x))
-
-
-def _rates(config: Config, x: float) -> dict[str, float]:
-    """The rates of x in place of those of `sharp`: between the presets geometric in x, beyond them constant."""
-    inside, found = min(max(x, 0.0), 1.0), {}
-    for name, quick in QUICK_RATES.items():
-        sharp = getattr(SHARP.optimiser, name)
-        if getattr(config.optimiser, name) == sharp:
-            found[name] = quick * (sharp / quick) ** inside
-    return found
+    return with_settings(timed, density=density, initialisation=points, training=training)
 
 
 def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float, threads: int) -> Config:
