@@ -116,6 +116,14 @@ def test_a_clip_or_a_part_of_a_run_in_place_of_a_run_names_what_to_use(folder, f
     assert_refused(capsys, ["evaluate", str(pictures)], f"`endotsr prepare {pictures} --out CLIP` makes a clip of it")
     for part in ("renders", "metrics.json", "test/ours_30"):
         assert_refused(capsys, ["evaluate", str(finished_run / part)], f"a part of one; use {finished_run}")
+    checkpoint = finished_run / "checkpoint.npz"
+    assert_refused(
+        capsys, ["render", str(checkpoint), "--out", str(tmp_path / "o")], f"a part of one; use {finished_run}"
+    )
+    assert_refused(
+        capsys, ["train", "--resume", str(checkpoint)], "--out RUN is missing: the run that --resume continues"
+    )
+    assert_refused(capsys, ["evaluate", str(finished_run), str(folder)], f"{folder}: a clip, not a method")
     (tmp_path / "runs").mkdir()
     shutil.copytree(finished_run, tmp_path / "runs/mine")
     assert_refused(capsys, ["evaluate", str(tmp_path / "runs")], "use one of those in it: mine")

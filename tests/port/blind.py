@@ -13,8 +13,8 @@ Prints 50 pairs of an operation and a kind of mistake. The protocol:
    the judge, and the set is blind no more.
 """
 
+import argparse
 import random
-import sys
 from typing import NamedTuple
 
 COUNT = 50
@@ -53,7 +53,11 @@ def drawn(seed: int, count: int = COUNT) -> list[Pair]:
 
 
 if __name__ == "__main__":
-    given = int(sys.argv[1]) if len(sys.argv) > 1 else random.SystemRandom().randrange(2**32)
-    print(f"seed {given}")
-    for number, pair in enumerate(drawn(given), 1):
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument(
+        "seed", type=int, nargs="?", default=random.SystemRandom().randrange(2**32), help="of the draw"
+    )
+    asked = options.parse_args()
+    print(f"seed {asked.seed}")
+    for number, pair in enumerate(drawn(asked.seed), 1):
         print(f"{number:3d}  {pair.operation:17} {pair.kind}")

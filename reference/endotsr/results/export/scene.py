@@ -20,6 +20,7 @@ from endotsr.results.export.model import load_slim_model
 from endotsr.results.export.placement import HERE, Placement, placement_of
 from endotsr.results.export.ply import read_gaussians_noted
 from endotsr.training.fitting.model import corrected_cameras, render_at, scene_at, spectral_from, without
+from endotsr.training.runs.files import OF_A_RUN
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.training.runs.model import Model, load_model
 from endotsr.training.runs.no_run import why_no_run
@@ -101,7 +102,7 @@ def open_scene(path: Path) -> MovingScene:
     path = Path(path)
     if path.suffix.lower() == ".ply" and not path.is_dir():
         return _from_ply(path)
-    if path.suffix.lower() == ".npz" and not path.is_dir():
+    if path.suffix.lower() == ".npz" and path.name not in OF_A_RUN and not path.is_dir():
         slim = load_slim_model(path)
         return MovingScene(slim.record, slim.model)
     if path.is_file():
