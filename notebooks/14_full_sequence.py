@@ -551,7 +551,7 @@ plt.show()
 # ![PSNR of every held-out frame: paper, an earlier run of quick, copy, blend and flow](/results/full_size/curves.svg)
 #
 # The run of `quick` in the picture is that of {doc}`/full_size`, an earlier one than those of the table. In all of them
-# `quick` still had the learning rates of `sharp`; with larger ones it is ahead of flow on this clip
+# `quick` still had the smaller learning rates of `paper`; with larger ones it is ahead of flow on this clip
 # ({doc}`/guides/which_preset`).
 #
 # The book keeps an extract of the first of these runs: the held-out frame at which the blend is worst, its neighbours, and
@@ -597,8 +597,8 @@ assert found["model"] > found["blend"] + 4 > found["copy"] + 6
 #
 # On this clip the model is better than the blend and level with flow, which needs no model. The model is also one scene
 # with depth, motion and other views; {doc}`/interpolation` names simpler means for each of them.
-# `endotsr simulate pulling --out CLIP` and `endotsr train CLIP --preset quick --out RUN`, with the rates of `sharp`
-# ({doc}`/specification/settings`), repeat a run.
+# `endotsr simulate pulling --out CLIP` and `endotsr train CLIP --preset quick --out RUN`, with the five rates of `paper`
+# ({doc}`/specification/rulings`), repeat a run.
 #
 # ## From Python
 #

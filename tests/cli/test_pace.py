@@ -38,16 +38,6 @@ def test_the_ends_are_the_presets():
     assert longer == pytest.approx(SHARP_LENGTH / QUICK.training.iterations, rel=1e-3)
 
 
-def test_learning_rates_fall_from_quick_to_sharp_and_a_chosen_one_stays():
-    rates = [paced(SHARP, x).optimiser for x in (-1.0, 0.0, 0.5, 1.0, 2.0)]
-    scales, rotations = [o.scale for o in rates], [o.rotation for o in rates]
-    assert scales == pytest.approx([0.01, 0.01, np.sqrt(0.01 * 0.005), 0.005, 0.005])
-    assert rotations == pytest.approx([0.003, 0.003, np.sqrt(0.003 * 0.001), 0.001, 0.001])
-    assert {(o.opacity, o.deformation_position_factor) for o in rates} == {(0.05, 3.0)}
-    chosen = paced(with_settings(SHARP, optimiser={"scale": 0.02}), 0.5).optimiser
-    assert (chosen.scale, chosen.rotation) == (0.02, rotations[2])
-
-
 @pytest.mark.parametrize("minutes", [1.0, 3.0, 10.0, 40.0])
 def test_the_planned_time_is_the_wish(still, minutes):
     config = paced_for(minutes, still, SHARP, unit=0.12, threads=1)
