@@ -161,12 +161,12 @@ OF_SHARP = {  # what differs from `sharp` of the same length
     "quick": (1600, {
         "preset": "quick", "density.growth": "budget", "density.maximum": 22_000,
         "initialisation.first_frame_points": 14_000, "initialisation.other_frame_points": 2000,
-        "optimiser.position": 3.2e-3, "optimiser.deformation": 2.4e-3, "optimiser.harmonics_base": 5e-3,
-        "optimiser.scale": 0.01, "optimiser.rotation": 0.003,
         "training.coarse_start": True, "training.visits_per_frame": 29,
     }),
     "demo": (1500, {
         "preset": "demo", "density.gradient_threshold": 7e-4,
+        "optimiser.position": 1.6e-3, "optimiser.deformation": 1.6e-3, "optimiser.harmonics_base": 2.5e-3,
+        "optimiser.scale": 0.005, "optimiser.rotation": 0.001,
         "initialisation.first_frame_points": 6000, "initialisation.other_frame_points": 1500,
     }),
 }  # fmt: skip
