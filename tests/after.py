@@ -11,6 +11,7 @@ rewrites its expected values, and says so in its first lines: run that command b
 
 import argparse
 import ast
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -120,7 +121,7 @@ def mistakes(paths: list[str]) -> list[str]:
     tables = [path for path in paths if path.startswith("golden/makers/") and path.endswith(".toml")]
     entries = [tomllib.loads((ROOT / path).read_text(encoding="utf-8")) for path in tables]
     tests = [f"{MISTAKE}[{flag}]" for table in entries for flag, entry in table.items() if isinstance(entry, dict)]
-    return [f"pytest -q -m slow -n 0 {' '.join(tests)}"] if tests else []
+    return [f"pytest -q -m slow -n 0 {shlex.join(tests)}"] if tests else []
 
 
 def tests_of(path: str) -> list[str]:
@@ -199,7 +200,7 @@ def main(words: list[str]) -> int:
     for command in (command for command in found if command not in left_out):
         print(command, flush=True)
         if given.run:
-            code = subprocess.run(command.split(), cwd=ROOT, check=False).returncode
+            code = subprocess.run(shlex.split(command), cwd=ROOT, check=False).returncode
             if code:
                 return code
     return 0

@@ -40,6 +40,7 @@ GROUND = ("errors", "untrusted", "config", "clips.opencv", "clips.sequences", "c
 BESIDE = ("golden", "docs/pages", "tests")  # folders of programs that run in the repository and are not installed
 LONGEST_FUNCTION = 40  # lines
 MOST_POSITIONAL = 12
+LARGEST_GOLDEN = 12_000_000  # bytes of golden/, which every clone and every port carries
 
 
 class Function(NamedTuple):
@@ -188,6 +189,12 @@ def commands(root: Path = ROOT) -> list[str]:
     raise ValueError("cli/parts/commands.py has no table COMMANDS")
 
 
+def golden_bytes(root: Path = ROOT) -> int:
+    """Bytes of the golden vectors and their makers."""
+    files = (file for file in (root / "golden").rglob("*") if file.is_file() and "__pycache__" not in file.parts)
+    return sum(file.stat().st_size for file in files)
+
+
 def main(root: Path) -> None:
     """Print the measures."""
     lines, found = lines_of(root), list(functions(root))
@@ -197,6 +204,7 @@ def main(root: Path) -> None:
     method = sum(lines[name] for name in METHOD)
     print(f"lines of the wheel: {sum(lines.values())}, of the method ({', '.join(METHOD)}): {method}")
     print("lines beside it, not installed:", ", ".join(f"{name} {n}" for name, n in lines_beside(root).items()))
+    print(f"golden: {golden_bytes(root)} of at most {LARGEST_GOLDEN} bytes")
     print(f"modules at the root: {sum(1 for file in (root / 'reference' / 'endotsr').glob('*.py'))}")
     print(f"settings: {len(settings(root))}; commands: {len(commands(root))}")
     widest = max(found, key=lambda f: f.positional)

@@ -1,5 +1,8 @@
 """Masks and image pairs, and the cases common to all masked means over an image."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from makers.making import Made, Seeds, Spec, changed, given, scalar
@@ -73,12 +76,16 @@ def masked_mean(
     generic: tuple[str, ...],
     one_pixel_only: tuple[str, ...],
     equal: tuple[str, ...],
+    settings: Mapping[str, Any] | None = None,
 ) -> list[Spec]:
-    """The five cases of a mean over tissue pixels; `gradient` names the input d_loss, the tuples are mistakes."""
+    """The five cases of a mean over tissue pixels, with settings of the operation.
+
+    `gradient` names the input d_loss, and the tuples are mistakes.
+    """
 
     def spec(case: str, title: str, flags: tuple[str, ...], images: dict[str, Made], mask: Made, d_loss=1.25, still=()):
         inputs = images | {"mask": mask, gradient: scalar(d_loss)}
-        return Spec(family, case, family, title, flags, {}, inputs, still)
+        return Spec(family, case, family, title, flags, dict(settings or {}), inputs, still)
 
     seeds = {case: Seeds(family, case) for case in ("generic", "one_pixel", "no_tissue", "equal", NOT_FINITE)}
     return [

@@ -50,7 +50,9 @@ def test_compiled_functions_take_the_same_arguments_in_the_same_order():
     here, there = functions(compiled=False), functions(compiled=True)
     shared = here.keys() & there.keys()
     assert len(shared) > 70
-    assert {name for name in shared if not follows(here[name], there[name])} == DIFFERENT
+    assert {name for name in shared if not follows(here[name], there[name])} == DIFFERENT, (
+        "arguments of the definition differ in name or order from those of the compiled function"
+    )
     assert all(f"`{name}`" in (endotsr.definition.__doc__ or "") for name in DIFFERENT | OTHER_FIELDS)
 
 

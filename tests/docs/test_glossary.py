@@ -137,8 +137,10 @@ def test_every_setting_exists():
 def test_the_log_keys_are_those_of_the_trainer():
     """`test_training.py` compares the keys of a real log with these. A term may have its key on its page instead."""
     pages = (page.read_text(encoding="utf-8") for page in (GLOSSARY.parent / "specification").glob("*.md"))
-    on_pages = {key for text in pages for key in re.findall(r"\bKey of the log: `(\w+)`", text)}
-    assert set(names("Log")) | on_pages == set(LogEntry.__annotations__)
+    on_pages = {key for text in pages for key in re.findall(r"\bKey\s+of\s+the\s+log:\s+`(\w+)`", text)}
+    assert set(names("Log")) | on_pages == set(LogEntry.__annotations__), (
+        "a key of the log needs a row of the glossary, or the words 'Key of the log: `key`' on the page of its term"
+    )
 
 
 def test_every_golden_array_exists():

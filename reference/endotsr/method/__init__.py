@@ -5,5 +5,5 @@ In: NumPy arrays, Gaussian index last. Out: values, and saved tuples for the rev
 and (B10) to (B12) are in `endotsr.training`.
 
 kernels    compilation, threads, the exponential         equations  (1) to (5) and (7) of the paper, (B1), (B13), (B16)
-losses     the base losses on images, (B6) to (B9)       splatting  the rasteriser, (B2) to (B5), and (B19)
+losses     the losses on images, from (B6) on            splatting  the rasteriser, (B2) to (B5), and (B19)
 """

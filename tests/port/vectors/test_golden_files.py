@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 
+import house
 import make
 from endotsr.errors import InputError
 from endotsr.method.splatting.fast.blocks import supports
@@ -68,8 +69,8 @@ def test_the_choices_of_the_method_are_all_there(golden):
 
 
 def test_the_folder_is_small():
-    files = [p for p in FOLDER.rglob("*") if p.is_file() and "__pycache__" not in p.parts]
-    assert sum(p.stat().st_size for p in files) < 10_000_000
+    size = house.golden_bytes()
+    assert size < house.LARGEST_GOLDEN, f"golden/ has {size} bytes: smaller or fewer cases, or a larger limit there"
 
 
 def test_raw_reading_needs_no_header(golden):

@@ -186,7 +186,7 @@ def read_sequence_file(folder: Path) -> SequenceFile:
 
 
 def _check_times(found: SequenceFile, path: Path) -> None:
-    """Raises InputError unless there is one finite time per frame, in ascending order."""
+    """Raises InputError unless there is one time per frame, in ascending order; `checked` has refused infinity."""
     if found.times is None:
         return
     if len(found.times) != found.frames:
@@ -194,8 +194,8 @@ def _check_times(found: SequenceFile, path: Path) -> None:
             f"{path}: times: {len(found.times)} numbers for {counted(found.frames, 'frame')}; use one per frame"
         )
     steps = np.diff(found.times)
-    if not np.isfinite(found.times).all() or (steps <= 0).any():
-        wrong = int(np.flatnonzero(~(steps > 0))[0]) + 1 if steps.size and not (steps > 0).all() else 0
+    if (steps <= 0).any():
+        wrong = int(np.flatnonzero(steps <= 0)[0]) + 1
         raise InputError(f"{path}: times: frame {wrong}: {found.times[wrong]:g}; use finite, ascending seconds")
 
 

@@ -1,4 +1,4 @@
-"""Stages of the base losses (B6) to (B9). Gradient checks hold the observed frame, its mask and the prior fixed."""
+"""Stages of the losses on images. Gradient checks hold the observed frame, its mask and the prior fixed."""
 
 from functools import partial
 from typing import Any

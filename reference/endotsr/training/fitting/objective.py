@@ -35,7 +35,7 @@ from endotsr.training.fitting.model import Spectral, camera_at, render_at
 from endotsr.training.scene.gaussians import Gaussians
 from endotsr.training.scene.parameters import FrameParameters
 
-TERM_STAGES = {"depth": "depth and smoothness", "smoothness": "depth and smoothness", "laplacian": "pyramid"}
+TIMED_AS = {"depth": "depth and smoothness", "smoothness": "depth and smoothness", "laplacian": "pyramid"}
 
 
 class Targets(NamedTuple):
@@ -66,7 +66,7 @@ class ImageLoss(NamedTuple):
     """Value, terms and gradient with respect to the images."""
 
     loss: float
-    terms: dict[str, float]  # l1, ssim, depth, smoothness, laplacian: unweighted; only those evaluated
+    terms: dict[str, float]  # unweighted, by the names of `LossTerms`; only those evaluated
     d_colour: FloatArray  # (3, H, W)
     d_depth: FloatArray  # (H, W)
 
@@ -162,7 +162,7 @@ def image_loss(
         calls["laplacian"] = lambda: laplacian_term(colour, image, supports, weights.laplacian, config.upsampling)
     photometric, *others = parallel_calls(
         timed(timer, "L1 and SSIM", lambda: photometric_loss(colour, targets, weights.ssim)),
-        *(timed(timer, TERM_STAGES[name], call) for name, call in calls.items()),
+        *(timed(timer, TIMED_AS[name], call) for name, call in calls.items()),
     )
     loss, terms, d_colour = photometric.loss, photometric.terms, photometric.d_colour
     d_depth = np.zeros_like(rendered.depth)
