@@ -38,6 +38,10 @@ MISTAKE = "tests/port/vectors/test_wrong_ports.py::test_a_wrong_port_is_refused_
 # Beginning of a changed path -> commands whose output depends on it.
 CONSTANTS, INVENTORIES = "python tests/port/unseen/by_hand/constants.py", "python docs/make.py recordings.inventories"
 OPERATIONS = "python docs/make.py ports.operations"
+RECORDED = tuple(  # of the records of single runs, which these programs find by the beginning of their names
+    f"python docs/make.py {name}"
+    for name in ("full_size.record", "book.presets", "book.readme_gaps", "book.figures", "bench", "claims", "full_size")
+)
 MAKERS = {
     f"{PACKAGE}config.py": ("python docs/make.py book.settings", CONSTANTS),
     f"{PACKAGE}definition/": ("python docs/make.py book.definitions",),
@@ -45,6 +49,8 @@ MAKERS = {
     f"{PACKAGE}clips/sequences/checks/kinds.py": (INVENTORIES,),
     f"{PACKAGE}clips/formats/calibration_fields.py": (INVENTORIES,),
     f"{PACKAGE}cli/parts/related_options.py": (INVENTORIES,),
+    "docs/results/pulling_": RECORDED,
+    "docs/results/cutting_": RECORDED,
     "notebooks/": ("python docs/make.py book.chapters",),
     "golden/cases/": (CONSTANTS,),
     "golden/makers/": (OPERATIONS,),
