@@ -125,7 +125,7 @@ def test_the_readme_says_of_the_gaps_what_their_table_says():
         assert flow.min() < 0 < flow.max() and tissue.min() > 0 and flow.size == blocks
     assert difference(16, readme_gaps.FLOW).min() > 0 > difference(16, readme_gaps.TISSUE).mean()
     rife = difference(8, readme_gaps.RIFE)
-    assert rife.size == 2 and 0 < rife.max() < 0.1 < 0.5 < -rife.min()
+    assert rife.size == 2 and 0 < rife.max() < -rife.min()
     for gap in readme_gaps.GAPS:
         model = readme_gaps.by_frame(readme_gaps.runs_of(gap), metric="lpips").mean()
         copy, _, flow, tissue, network = (
