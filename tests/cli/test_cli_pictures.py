@@ -97,6 +97,13 @@ def test_compare_runs_and_pictures(finished_run, flow_pictures, tmp_path, capsys
     assert "Optical-flow" not in capsys.readouterr().out
 
 
+def test_a_method_is_a_folder_of_png_files_too(finished_run, capsys):
+    """Such a folder could be prepared as a clip; a clip itself is refused in `test_cli_bad_input.py`."""
+    (renders,) = (finished_run / "test").glob("ours_*/renders")
+    assert main(["evaluate", f"ours={finished_run}", f"files={renders}"]) == 0
+    assert "files" in capsys.readouterr().out
+
+
 def test_a_single_run_is_compared_with_its_baselines(finished_run, capsys):
     assert main(["evaluate", "--compare", f"ours={finished_run}"]) == 0
     said = capsys.readouterr().out

@@ -86,8 +86,8 @@ def run(words: list[str]) -> int:
     base, schedule_note = base_settings(words)
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base))
     if options.out is None:
-        new = "the run folder to create"
-        raise InputError(f"train: --out RUN is missing: {'the run that --resume continues' if options.resume else new}")
+        wanted = "the run that --resume continues" if options.resume else "the run folder to create"
+        raise InputError(f"train: --out RUN is missing: {wanted}")
     if options.calibrate_only:
         return _calibrate(options, words)
     if options.evaluate:

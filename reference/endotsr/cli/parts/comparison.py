@@ -156,11 +156,10 @@ def _metrics(
     from endotsr.clips.formats.video_file import is_video
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.evaluation.pictures import find_renders, measure_pictures
-    from endotsr.training.runs.no_run import refuse_clip_as_method
 
     if not path.is_dir() and not is_video(path):
         return cast("EvaluationRecord", read_json(path)), sequence
-    refuse_clip_as_method(path)
+
     if sequence is None:
         run = next((p for p in paths if (p / "run.json").exists()), None) if asked.sequence is None else None
         sequence = shown_sequence(run, asked.sequence, asked.settings)

@@ -58,11 +58,12 @@ def find_renders(folder: Path, sequence: Sequence) -> Pictures:
     stem up to its first dot); the frame number in the name, counted from 0; the order of the numbers, if there are as
     many files as held-out frames, or as many as frames. For a video only the order applies.
 
-    Raises: InputError for a folder without pictures, if no rule applies, or for an unreadable video.
+    Raises: InputError for a clip, for a folder without pictures, if no rule applies, or for an unreadable video.
     """
     folder = Path(folder)
     if is_video(folder):
         return _of_video(folder, sequence)
+    _refuse_clip(folder)
     files = _listed(folder)
     held_out = [int(i) for i in sequence.test_index]
     numbers = frame_numbers(files)
@@ -79,6 +80,17 @@ def find_renders(folder: Path, sequence: Sequence) -> Pictures:
         f"{folder}: {len(files)} {files[0].suffix} files cannot be paired with the {len(held_out)} held-out frames "
         f"({wanted}); use their names, their numbers, or one file for each, numbered in order"
     )
+
+
+def _refuse_clip(folder: Path) -> None:
+    """Raises InputError for a folder that is trained on: its pictures are what methods predict."""
+    from endotsr.clips.sequences.layouts import layouts
+
+    if any(layout.direct and layout.recognises(folder) for layout in layouts()):
+        raise InputError(
+            f"{folder}: a clip, not a method; `endotsr evaluate RUN` measures a run on its own clip, and --sequence"
+            " names the clip of a folder of pictures"
+        )
 
 
 def _of_video(path: Path, sequence: Sequence) -> Pictures:

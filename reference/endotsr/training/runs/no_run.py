@@ -30,15 +30,6 @@ def why_no_run(path: Path) -> str:
     return clip or f"not a run folder: {missing[0]} is missing"
 
 
-def refuse_clip_as_method(path: Path) -> None:
-    """Raises InputError for a clip among methods to compare: its pictures are what methods predict."""
-    if _of_clip(path):
-        raise InputError(
-            f"{path}: a clip, not a method; `endotsr evaluate RUN` measures a run on its own clip, and --sequence names"
-            " the clip of a folder of pictures"
-        )
-
-
 def _of_clip(path: Path) -> str:
     """What is said of a clip or of a recording in place of a run; empty for any other path."""
     try:
