@@ -1,4 +1,4 @@
-"""docs/guides/prepare.md: every layout has its section; the errors of poses in its tables are computed rightly."""
+"""Every layout has its section in docs/guides/prepare.md; the errors of poses in poses.md are computed rightly."""
 
 from pathlib import Path
 

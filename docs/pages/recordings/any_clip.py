@@ -148,6 +148,6 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
 
 
 PROGRAM = Program(
-    __name__, "guides/prepare.md", {"ways": table}, "any_clip.json", measured,
+    __name__, "guides/checks.md", {"ways": table}, "any_clip.json", measured,
     {"--ways": {"nargs": "+", "choices": list(WAYS), "default": list(WAYS)}},
 )  # fmt: skip

@@ -1,6 +1,6 @@
 """Detection of flipped or mirrored depth by the light: clips as stored, and their flips.
 
-python docs/make.py recordings.flips CLIP ...      sequence folders; writes the table in docs/guides/prepare.md
+python docs/make.py recordings.flips CLIP ...      sequence folders; writes the table in docs/guides/depth.md
 """
 
 from pathlib import Path
@@ -14,7 +14,7 @@ from endotsr.config import PAPER
 from endotsr.results.report.tables import markdown
 from pages.store.marks import write_marked
 
-PAGE = Path(__file__).parents[2] / "guides" / "prepare.md"
+PAGE = Path(__file__).parents[2] / "guides" / "depth.md"
 
 
 def row(folder: Path) -> list[str]:

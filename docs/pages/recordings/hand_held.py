@@ -159,5 +159,5 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
 
 
 PROGRAM = Program(
-    __name__, "guides/prepare.md", tables, "hand_held.json", measured, {"--data": DATA, "--seeds": 3},
+    __name__, "guides/poses.md", tables, "hand_held.json", measured, {"--data": DATA, "--seeds": 3},
 )  # fmt: skip

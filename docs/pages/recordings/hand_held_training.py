@@ -90,6 +90,6 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
 
 
 PROGRAM = Program(
-    __name__, "guides/prepare.md", {"training": table}, "hand_held_training.json", measured,
+    __name__, "guides/poses.md", {"training": table}, "hand_held_training.json", measured,
     {"--seeds": 3, "--jobs": 1, "--poses": {"choices": POSES, "help": "one kind (default: all)"}},
 )  # fmt: skip

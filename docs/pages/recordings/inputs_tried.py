@@ -54,4 +54,4 @@ def table(result: dict[str, Any]) -> str:
     )
 
 
-PROGRAM = Program(__name__, "guides/prepare.md", {"table": table}, "inputs_tried.json", measured)
+PROGRAM = Program(__name__, "guides/checks.md", {"table": table}, "inputs_tried.json", measured)

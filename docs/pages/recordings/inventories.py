@@ -1,4 +1,4 @@
-"""Write the tables of the fields of file formats, of related options and of findings in docs/guides/prepare.md.
+"""Write the tables of the fields of file formats, of related options and of findings in docs/guides.
 
     python docs/make.py recordings.inventories
 
@@ -77,4 +77,4 @@ def _code(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-PROGRAM = Program(__name__, "guides/prepare.md", {"fields": fields, "options": options, "findings": findings})
+PROGRAM = Program(__name__, ("guides/fields.md", "guides/checks.md"), {"fields": fields, "options": options, "findings": findings})

@@ -1,4 +1,4 @@
-"""Measure the proposed masks against true ones, and write the table of docs/guides/prepare.md.
+"""Measure the proposed masks against true ones, and write the table of docs/guides/masks.md.
 
     python docs/make.py recordings.masks measure [--data ../shared/data/endonerf_pulling]      a minute or two
 
@@ -60,5 +60,5 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
 
 
 PROGRAM = Program(
-    __name__, "guides/prepare.md", {"iou": table}, "masks.json", measured, {"--data": DATA / "endonerf_pulling"}
+    __name__, "guides/masks.md", {"iou": table}, "masks.json", measured, {"--data": DATA / "endonerf_pulling"}
 )

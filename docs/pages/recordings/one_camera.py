@@ -171,4 +171,4 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
     return {"scenes": scenes}
 
 
-PROGRAM = Program(__name__, "guides/prepare.md", {"table": table}, "one_camera.json", measured)
+PROGRAM = Program(__name__, "guides/depth.md", {"table": table}, "one_camera.json", measured)

@@ -139,6 +139,6 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
 
 
 PROGRAM = Program(
-    __name__, "guides/prepare.md", {"ways": table}, "own_pictures.json", measured,
+    __name__, "guides/checks.md", {"ways": table}, "own_pictures.json", measured,
     {"clip": CLIP, "--seeds": 3, "--iterations": 1500},
 )  # fmt: skip

@@ -144,5 +144,5 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
 
 
 PROGRAM = Program(
-    __name__, "guides/prepare.md", {"table": table}, "pose_readings.json", measured, {"--data": DATA, "--seeds": 3}
+    __name__, "guides/poses.md", {"table": table}, "pose_readings.json", measured, {"--data": DATA, "--seeds": 3}
 )

@@ -67,5 +67,5 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
 
 
 PROGRAM = Program(
-    __name__, "guides/prepare.md", {"table": table}, "pose_returns.json", measured, {"--seeds": 3},
+    __name__, "guides/poses.md", {"table": table}, "pose_returns.json", measured, {"--seeds": 3},
 )  # fmt: skip

@@ -137,6 +137,6 @@ def table(result: dict[str, Any]) -> str:
 
 
 PROGRAM = Program(
-    __name__, "guides/prepare.md", {"table": table}, "poses.json", measured,
+    __name__, "guides/poses.md", {"table": table}, "poses.json", measured,
     {"clips": CLIPS, "--seeds": 3, "--jobs": 2},
 )  # fmt: skip

@@ -80,6 +80,6 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
 
 
 PROGRAM = Program(
-    __name__, "guides/prepare.md", {"table": table}, "scope_video.json", measured,
+    __name__, "guides/poses.md", {"table": table}, "scope_video.json", measured,
     {"--data": DATA / "sinus_endoscopy", "--seeds": 3},
 )  # fmt: skip
