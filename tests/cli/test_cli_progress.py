@@ -10,6 +10,8 @@ from endotsr.cli.parts import progress
 from endotsr.cli.parts.progress import Progress
 from endotsr.cli.parts.waiting import in_words, waiting_line
 from endotsr.clips.sequences.forecast.seconds import (
+    COMPARED,
+    COMPARED_TOGETHER,
     PAGES,
     Beside,
     TimedCommand,
@@ -214,6 +216,20 @@ def test_the_time_left_is_unknown_while_the_second_thread_works_but_not_for_long
     assert quick.unit == pytest.approx(0.1 / float(iteration_work(16_000, PIXELS, 0.02, plan.vectors)), rel=0.1)
 
 
+def test_a_speed_that_was_timed_before_counts_while_the_second_thread_works():
+    """On a simulated clip of 300 frames, its correction made the time left half as long again as it was."""
+    for before, found in ((0.08, 0.08), (0.15, 0.1), (0.01, 0.05)):
+        told = TimeLeft(plan_of("quick", 300, 2)._replace(unit=before))
+        for k in range(1, 6):
+            assert told.unit is None, k
+            work = float(iteration_work(16_000, PIXELS, k / told._plan.config.training.iterations))
+            told.add(progress.Standing(k, 16_000), 0.1 * work, Making(k, 0.0, 0.3 * k))
+        assert told.unit == pytest.approx(found), "the median iteration at most, half of the fastest at least"
+    for k in range(6, 8 + LEAST_QUIET):
+        told.add(progress.Standing(k, 16_000), 0.06 * work, Making(5, 0.0, 1.5))
+    assert told.unit == pytest.approx(0.06, rel=0.01), "its own iterations count as soon as there are enough"
+
+
 def iterations(*seconds, waited=0.0, beside=0.0):
     return [Timed(one, 1.0, waited, beside) for one in seconds]
 
@@ -296,12 +312,13 @@ def test_minutes_in_words(given, shown):
 
 @pytest.mark.parametrize(("count", "pairs"), [(63, 10 * 62), (300, 12 * 63)])
 def test_the_evaluation_of_a_simulated_clip_is_forecast_with_its_known_motion(count, pairs):
-    """In processor time of one thread it took 0.2 s a pair, more than everything else of an evaluation."""
-    plan = plan_of("quick", count, 1)._replace(perceived=True)
-    known = plan._replace(frames=plan.frames.with_true_motion())
-    assert known.frames.compared == pairs
-    more = estimated_seconds(known, 0.1).evaluation - estimated_seconds(plan, 0.1).evaluation
-    assert more == pytest.approx(1.6 * known.evaluating(0.1) * pairs)
+    """In processor time of one thread it took 0.16 s a pair, more than everything else of an evaluation."""
+    for threads, each in ((1, COMPARED), (2, COMPARED * COMPARED_TOGETHER)):
+        plan = plan_of("quick", count, threads)._replace(perceived=True)
+        known = plan._replace(frames=plan.frames.with_true_motion())
+        assert known.frames.compared == pairs
+        more = estimated_seconds(known, 0.1).evaluation - estimated_seconds(plan, 0.1).evaluation
+        assert more == pytest.approx(each * known.evaluating(0.1) * pairs)
 
 
 def test_the_vectors_change_the_forecast_of_the_iterations_alone(monkeypatch):

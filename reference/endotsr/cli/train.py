@@ -311,7 +311,7 @@ def _progress(
     from endotsr.results.report.live_page import LIVE_PAGE, LivePage
     from endotsr.training.fitting.compile_ahead import done_before
     from endotsr.training.runs.sources import SIMULATED
-    from endotsr.training.runs.speed import LEAST_PIXELS, known_speed
+    from endotsr.training.runs.speed import ASSUMED, LEAST_PIXELS, known_speed
 
     frames, threads = frames_of(sequence.train_index, sequence.test_index), numba.get_num_threads()
     if source == SIMULATED or has_truth(Path(source)):
@@ -320,7 +320,8 @@ def _progress(
     pixels = sequence.width * sequence.height
     timed = partial(_timed_unit, sequence, config) if pixels >= LEAST_PIXELS else None
     speed = known_speed(threads, timed if unit is None else lambda: unit)
-    plan = TimedCommand(config, frames, pixels, threads, perceived, vector_factor(), speed.beside)
+    before = None if speed.source == ASSUMED else speed.unit
+    plan = TimedCommand(config, frames, pixels, threads, perceived, vector_factor(), speed.beside, before)
     print(waiting_line(plan, speed, done_before(config).exists(), at))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
     return Progress(plan, LivePage(folder, sequence, config))

@@ -70,10 +70,15 @@ class TimeLeft:
 
     @property
     def unit(self) -> float | None:
-        """Seconds per unit of work; None = too few iterations, or too few without the second thread up to now."""
-        beside = any(one.beside for one in self._timed)
-        if beside and self._seconds < PATIENCE and len(quiet(self._timed)) < LEAST_QUIET:
-            return None
+        """Seconds per unit of work; None = too few iterations, or too few without the second thread up to now.
+
+        While the second thread makes targets, the speed that was timed before is more exact than theirs.
+        """
+        if any(one.beside for one in self._timed) and len(quiet(self._timed)) < LEAST_QUIET:
+            if self._plan.unit is not None:
+                return within(self._timed, self._plan.unit)
+            if self._seconds < PATIENCE:
+                return None
         return unit_seconds(self._timed, SLOWED / self._plan.threads)
 
     def seconds(self, standing: Standing) -> float | None:
@@ -119,6 +124,17 @@ def unit_seconds(timed: Iterable[Timed], slowed: float) -> float | None:
     kept = [one for one, unit in zip(known, each) if unit <= limit]
     lost = slowed * max(sum(one.beside - one.waited for one in kept), 0.0)
     return max((sum(one.seconds for one in kept) - lost) / sum(one.work for one in kept), min(each) / 2)
+
+
+def within(timed: Iterable[Timed], before: float) -> float | None:
+    """Seconds per unit of work, as timed before, if the iterations do not contradict it; None = too few of them.
+
+    Edges:   the median iteration at most, since a second thread makes none faster, and half of the fastest at least
+    """
+    each = [one.seconds / one.work for one in timed]
+    if len(each) < LEAST_ITERATIONS:
+        return None
+    return max(min(before, statistics.median(each)), min(each) / 2)
 
 
 def quiet(timed: Iterable[Timed]) -> list[Timed]:

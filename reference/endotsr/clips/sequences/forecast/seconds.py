@@ -44,7 +44,8 @@ EVERY_TRAINING_FRAME = 6  # one training frame of these is evaluated, without LP
 # Frames whose motion is compared with a known truth. The number of pairs would grow with the square of the clip: 300
 # frames would have 44 * 299.
 MOST_REFERENCES, MOST_TIMES = 12, 64
-COMPARED = 1.6  # units per pair of them
+COMPARED = 1.25  # units per pair of them
+COMPARED_TOGETHER = 0.55  # factor with several threads, from one run on two of them
 COMPILATION = 30.0  # seconds for the kernels of a training, once per machine
 
 
@@ -110,6 +111,7 @@ class TimedCommand(NamedTuple):
     perceived: bool | None = True  # whether the evaluation computes LPIPS; None = no evaluation
     vectors: float = 1.0  # `vector_factor` of the processor
     beside: Beside = Beside()
+    unit: float | None = None  # seconds per unit of work, as timed on this machine before; None = not yet
 
     def alone(self, unit: float) -> float:
         """Seconds per unit of the parts beside the iterations, on one thread: timed, or by `like_iterations`."""
@@ -200,8 +202,10 @@ def evaluation_units(plan: TimedCommand) -> float:
     if plan.perceived is None:
         return 0.0
     pictures = plan.frames.held_out * METHODS * (MEASURED + PERCEIVED * plan.perceived)
-    pictures *= TOGETHER if plan.threads > 1 else 1.0
-    pictures += MEASURED * plan.frames.training / EVERY_TRAINING_FRAME + COMPARED * plan.frames.compared
+    pairs = COMPARED * plan.frames.compared
+    if plan.threads > 1:
+        pictures, pairs = TOGETHER * pictures, COMPARED_TOGETHER * pairs
+    pictures += MEASURED * plan.frames.training / EVERY_TRAINING_FRAME + pairs
     return PAGES * gaussians_at_end(plan.config, plan.pixels) + plan.pixels / PIXELS * pictures
 
 
