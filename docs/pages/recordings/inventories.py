@@ -77,4 +77,5 @@ def _code(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-PROGRAM = Program(__name__, ("guides/fields.md", "guides/checks.md"), {"fields": fields, "options": options, "findings": findings})
+PAGES = ("guides/fields.md", "guides/checks.md")
+PROGRAM = Program(__name__, PAGES, {"fields": fields, "options": options, "findings": findings})
