@@ -21,7 +21,7 @@ from endotsr.method.kernels.arrays import Array
 from endotsr.method.kernels.memory import Kept
 from endotsr.method.losses.masked_ssim import stored_target
 from endotsr.method.splatting.camera import Camera
-from endotsr.training.fitting.objective import Targets, optional_depth_target, targets_of
+from endotsr.training.fitting.objective import Targets, joined_targets, optional_depth_target
 from endotsr.training.fitting.packed import (
     STEPS,
     PackedDepth,
@@ -67,7 +67,9 @@ class BridgedTargets:
         depth = None if made.depth is None else unpacked_depth(made.depth, precision)
         rule = self.config.loss.upsampling
         supports = None if made.supports is None else unpacked_supports(made.supports, mask, rule)
-        return targets_of(stored_target(made.image, STEPS, mask, precision), depth, supports, self.config), made.camera
+        return joined_targets(
+            stored_target(made.image, STEPS, mask, precision), depth, supports, self.config
+        ), made.camera
 
     def of_gap(self, earlier: int, later: int, waiting: bool = False) -> dict[BridgedTime, Stored]:
         """The targets of all times of a gap, from any thread. Two threads may compute the same gap, with equal bits.

@@ -71,7 +71,9 @@ class ImageLoss(NamedTuple):
     d_depth: FloatArray  # (H, W)
 
 
-def targets_of(target: SsimTarget, depth: DepthTarget | None, supports: SupportMasks | None, config: Config) -> Targets:
+def joined_targets(
+    target: SsimTarget, depth: DepthTarget | None, supports: SupportMasks | None, config: Config
+) -> Targets:
     """The targets of one frame, from its masked image, depth target and pyramid supports."""
     # the SSIM target has the only copy of the image, zero outside tissue
     return Targets(target.image, target.mask, target if config.loss.ssim_weight > 0 else None, depth, supports)
@@ -86,7 +88,7 @@ def frame_targets(frame: Frame, config: Config) -> Targets:
     """Masked target image, depth target and pyramid supports of one frame."""
     depth = optional_depth_target(frame.depth, frame.mask, config)
     supports = support_masks(frame.mask, LEVELS, config.loss.upsampling) if config.model.laplacian else None
-    return targets_of(ssim_target(frame.image, frame.mask), depth, supports, config)
+    return joined_targets(ssim_target(frame.image, frame.mask), depth, supports, config)
 
 
 def photometric_loss(colour: FloatArray, targets: Targets, ssim_weight: float) -> ImageLoss:

@@ -24,7 +24,7 @@ from endotsr.training.fitting.adam import AdamState, Rate, adam_state
 from endotsr.training.fitting.bridged import BridgedTargets
 from endotsr.training.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
 from endotsr.training.fitting.model import OffsetsAhead, Spectral, spectral_from
-from endotsr.training.fitting.objective import Targets, optional_depth_target, targets_of
+from endotsr.training.fitting.objective import Targets, joined_targets, optional_depth_target
 from endotsr.training.fitting.packed import PackedMask, packed_supports, unpacked_supports
 from endotsr.training.fitting.records import NOTHING_MADE, CheckpointHeader, Making, RngState
 from endotsr.training.fitting.sampling import Drawn, View
@@ -94,7 +94,7 @@ class TrainingConstants:
         depth = optional_depth_target(sequence.depth[index].astype(precision, copy=False), mask, config)
         if config.model.laplacian:
             supports = unpacked_supports(self.supports.get(index, lambda: packed_supports(mask, rule)), mask, rule)
-        return targets_of(stored_target(sequence.images[index], 255, mask, precision), depth, supports, config)
+        return joined_targets(stored_target(sequence.images[index], 255, mask, precision), depth, supports, config)
 
 
 def training_constants(sequence: Sequence, config: Config) -> TrainingConstants:

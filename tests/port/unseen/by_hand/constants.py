@@ -1,6 +1,6 @@
 """Which cases move each setting and each constant of the specification: golden/SETTINGS.md, made by
 
-    python tests/port/unseen/by_hand/constants.py
+    python docs/make.py ports.settings
 
 A row of the settings says, for each value, a case that refuses a port which always uses it. A row of the constants says
 which cases refuse the port by hand with another value of it (`constants.toml`).
@@ -23,7 +23,7 @@ from makers import hard_coded
 PAGE = golden_folder() / "SETTINGS.md"
 HEAD = """# What moves in the cases
 
-Made by `python tests/port/unseen/by_hand/constants.py`; do not edit.
+Made by `python docs/make.py ports.settings`; do not edit.
 
 ## Settings
 
@@ -113,7 +113,3 @@ def main() -> None:
         sys.exit(f"error: {error}")
     PAGE.write_text(text, encoding="utf-8", newline="\n")
     print(f"{PAGE} written")
-
-
-if __name__ == "__main__":
-    main()
