@@ -197,7 +197,7 @@ def test_a_source_that_is_not_prepared_gets_its_masks_in_a_folder(tmp_path, caps
     assert main([*words[:-1], str(tmp_path / "other"), "--replace"]) == 2
     assert "is not replaced: it holds no proposal.json" in capsys.readouterr().err
     assert main(words[:-2]) == 2
-    assert "has no sequence.toml; use a folder that `endotsr prepare" in capsys.readouterr().err
+    assert "has no sequence.toml; `endotsr prepare" in capsys.readouterr().err
 
 
 def files_in(folder: Path) -> dict[Path, bytes]:

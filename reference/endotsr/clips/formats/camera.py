@@ -15,7 +15,7 @@ from endotsr.method.splatting.camera import CameraPose
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 ARBITRARY = "arbitrary"
 LARGEST_SIDE = 1 << 16  # pixels of a stated picture
-LEAST_VIEW, MOST_VIEW = 1, 170  # degrees, of `--field-of-view`
+LEAST_VIEW, MOST_VIEW = 5, 170  # degrees, of `--field-of-view`
 SPREAD = 0.003  # of the focal length: 1 px at the border of a picture of 640 px; of the picture; of a coefficient
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
 ROTATIONS = "use the matrix of a rotation, of determinant 1"
@@ -57,10 +57,13 @@ def focal_length(angle: float, side: int) -> float:
 def intrinsics_of_view(degrees: float, width: int, height: int) -> Intrinsics:
     """Square pixels and a centred principal point: f = (width / 2) / tan(angle / 2), with the horizontal angle.
 
-    Raises:  InputError for an angle outside 1 to 170 degrees; a picture of a pinhole camera has no 180.
+    Raises:  InputError for an angle outside 5 to 170 degrees, such as one in radians; a picture of a pinhole camera has
+             no 180.
     """
     if not LEAST_VIEW <= degrees <= MOST_VIEW:
-        raise InputError(f"--field-of-view {degrees:g}: use the horizontal angle, {LEAST_VIEW} to {MOST_VIEW} degrees")
+        radians = f"; {degrees:g} radians are {np.degrees(degrees):.1f} degrees" if 0 < degrees < np.pi else ""
+        allowed = f"use the horizontal angle, {LEAST_VIEW} to {MOST_VIEW} degrees"
+        raise InputError(f"--field-of-view {degrees:g}: {allowed}{radians}")
     focal = focal_length(np.radians(degrees), width)
     return Intrinsics(focal, focal, width / 2, height / 2, width, height)
 

@@ -10,6 +10,7 @@ In: a folder in the common format and files of r, one per frame. Out: depth fram
 assumptions.
 """
 
+import shlex
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -173,7 +174,9 @@ def _refuse_known_scale(clip: Clip) -> None:
     """Raises InputError if a stereo pair or moving poses fix the scale."""
     poses = [pose for pose in clip.poses or [] if pose is not None]
     if clip.right and clip.baseline:
-        raise InputError(f"{clip.where}: a stereo pair gives lengths; use `endotsr depth {clip.where}` first")
+        raise InputError(
+            f"{clip.where}: a stereo pair gives lengths; use `endotsr depth {shlex.quote(str(clip.where))}` first"
+        )
     if moves(poses):
         raise InputError(
             f"{clip.where}: the camera moves, and its poses fix the scale of the depth, which relative numbers do"

@@ -4,6 +4,7 @@ In: a `Clip` of a layout that training reads directly, and the settings. Out: a 
 assumption, or an `InputError`. The steps, in order: reading, world, tissue fraction and polarity, depth, scaling.
 """
 
+import shlex
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -104,10 +105,8 @@ def usable(clip: Clip) -> Clip:
     """The clip. Raises InputError for a fault, distorted pictures or missing depth."""
     clip = without_faults(clip)
     if clip.intrinsics and any(clip.intrinsics.distortion):
-        raise InputError(
-            f"{clip.where}: the pictures are distorted (camera.distortion); `endotsr prepare {clip.where} --out FOLDER`"
-            " straightens them"
-        )
+        command = f"endotsr prepare {shlex.quote(str(clip.where))} --out FOLDER"
+        raise InputError(f"{clip.where}: the pictures are distorted (camera.distortion); `{command}` straightens them")
     if clip.depth is None:
         remedy = "`endotsr depth` makes it from the stereo pair" if clip.right else ONE_CAMERA
         file = clip.stated_in.name if clip.stated_in else ""

@@ -40,8 +40,10 @@ In: the file. Out: `SequenceFile`, or an `InputError` that names the key and wha
 contains one picture per frame, `images_right/` the right pictures of a stereo pair.
 """
 
+import os
+import shlex
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NoReturn
 
 import msgspec
 import numpy as np
@@ -50,6 +52,7 @@ from endotsr.clips.formats.camera import ARBITRARY, Intrinsics, checked_intrinsi
 from endotsr.clips.formats.choices import Axes, Direction, Unit
 from endotsr.clips.sequences.clip import Assumed
 from endotsr.clips.sequences.crop import stated_crop
+from endotsr.clips.sequences.record import is_run
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.names import counted, file_name
@@ -149,14 +152,26 @@ class SequenceFile(Section, frozen=True, kw_only=True):
         return self.camera.baseline * scene_factor(self.unit)
 
 
+def _refuse_unprepared(path: Path) -> NoReturn:
+    from endotsr.clips.sequences.unknown_source import not_there, what_it_is
+
+    if not os.path.lexists(path):
+        raise InputError(f"{path}: {not_there(path)}")
+    if is_run(path):
+        raise InputError(f"{path}: has no {FILE_NAME}{what_it_is(path)}")
+    what = "is a file, and no folder with" if path.is_file() else "has no"
+    command = f"endotsr prepare {shlex.quote(str(path))} --out FOLDER"
+    raise InputError(f"{path}: {what} {FILE_NAME}; `{command}` writes a folder with one")
+
+
 def read_sequence_file(folder: Path) -> SequenceFile:
     """The checked contents of `sequence.toml` in a folder.
 
     Raises:  InputError naming the file, the key and what is allowed.
     """
     path = Path(folder) / FILE_NAME
-    if Path(folder).is_dir() and not path.exists():
-        raise InputError(f"{folder}: has no {FILE_NAME}; use a folder that `endotsr prepare SOURCE --out FOLDER` wrote")
+    if not path.exists():
+        _refuse_unprepared(Path(folder))
     data = read_toml(path)
     if data.get("format") != FORMAT:
         raise InputError(f"{path}: format = {data.get('format')!r} is not allowed; use {FORMAT!r}")

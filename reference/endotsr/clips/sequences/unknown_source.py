@@ -4,6 +4,7 @@ In: the path. Out: the end of a refusal; "" if nothing follows from what is ther
 """
 
 import re
+import shlex
 from collections import Counter
 from pathlib import Path
 
@@ -87,7 +88,8 @@ def _of_folder(path: Path) -> str:
         return f": it holds {count} files that end in {ending}; let their names end in .jpg"
     videos = sorted(plain_line(file.name) for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
     if len(videos) == 1:
-        return f": it holds {videos[0]}, which `endotsr prepare {path / videos[0]} --out FOLDER` converts"
+        source = shlex.quote(str(path / videos[0]))
+        return f": it holds {videos[0]}, which `endotsr prepare {source} --out FOLDER` converts"
     if videos:
         return f": it holds {shortened(videos)}; give the video itself, and join the parts of one recording before"
     if not any(path.iterdir()):

@@ -101,7 +101,8 @@ def refuse_command(command: str, seconds: float) -> None:
     if not seconds > 0:
         raise InputError(f"--timeout {seconds:g}; use seconds above 0, or inf")
     if "{requests}" not in command or "{outputs}" not in command:
-        raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
+        given = f"--port {command!r}" if command else "--port is missing"
+        raise InputError(f"{given}: use the command of a port with the words {{requests}} and {{outputs}}")
 
 
 def words_of(command: str, *, backslash_escapes: bool = os.name != "nt") -> list[str]:

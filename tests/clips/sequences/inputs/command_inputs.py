@@ -53,6 +53,12 @@ def as_first(clip: Path, name: str) -> None:
     each(name, lambda plane: first)(clip)
 
 
+def unprepared(command: str, name: str):
+    """A command for prepared clips, on a recording."""
+    made = video("a.mp4") if name == "a.mp4" else twelve()
+    return lambda folder: made(folder) and [command, str(folder / name)]
+
+
 def edited(change):
     """sequence.toml of the common format with other bytes."""
     return common(change=lambda clip: changed_bytes(change)(clip / FILE_NAME))
@@ -194,6 +200,13 @@ COMMAND_ROWS = [
         "it holds the folders first try;"),
     refused("a zip file", one_file("a.zip", b"PK\3\4"), "an archive; unpack it first"),
     refused("a folder that is not there", prepare("nothing"), "not found"),
+    refused("depth, a folder that is not there", lambda folder: ["depth", str(folder / "clip")], "clip: not found"),
+    refused("depth of a video", unprepared("depth", "a.mp4"), "is a file, and no folder with sequence.toml; `endotsr"),
+    refused("poses of a folder of pictures", unprepared("poses", "clip"), " --out FOLDER` writes a folder with one"),
+    refused("pictures one by one", lambda folder: [*twelve()(folder)[:2], str(folder / "clip"), "--out", "o"],
+            "a second path; give one, such as the folder"),
+    refused("field of view in radians", lambda folder: [*video("a.mp4")(folder)[:4], "--field-of-view", "1.2"],
+            "1.2 radians are 68.8 degrees"),
     refused("an empty folder", one_file("clip", Path.mkdir), "the folder is empty"),
     refused("a folder of videos", one_file("clip", videos), "it holds part 1.mp4, part 2.mp4; give the video itself"),
     refused("a video of another format", one_file("a.y4m", "YUV4MPEG2 W128 H96 F25:1\n"),

@@ -4,6 +4,7 @@ Every file in this folder defines a value `LAYOUT` and is registered automatical
 order of `rank`: unambiguous ones first, a plain folder of pictures last.
 """
 
+import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -76,8 +77,10 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
     for layout in layouts():
         if layout.recognises(path):
             return layout
+    if what := what_it_is(path):
+        raise InputError(f"{path}: no known layout{what}")
     known = "; ".join(f"{layout.name} ({layout.about})" for layout in layouts())
-    raise InputError(f"{path}: no known layout{what_it_is(path)}; use {known}")
+    raise InputError(f"{path}: no known layout; use {known}")
 
 
 def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
@@ -168,7 +171,7 @@ def _instead_of(path: Path) -> str:
     above = path.resolve().parent
     if path.is_dir() and any(layout.direct and layout.recognises(above) for layout in layouts()):
         return f"it is a part of the sequence {above}: use that folder"
-    return f"`endotsr prepare {path} --out FOLDER` converts it"
+    return f"`endotsr prepare {shlex.quote(str(path))} --out FOLDER` converts it"
 
 
 def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
