@@ -37,7 +37,7 @@ PULLING, SHARP = "pulling_paper_seed0.json", "pulling_sharp_seed?.json"
 PAPER = "pulling_paper_seed?.json"
 ALONE = "clips.endonerf_pulling.every eighth frame.baselines"
 CUTTING = "clips.endonerf_cutting.every eighth frame.baselines"
-BLOCKS8, BLOCKS16 = "clips.endonerf_pulling.blocks of 8 frames.baselines", "pulling_sharp_blocks16.json"
+BLOCKS8, BLOCKS16 = "clips.endonerf_pulling.blocks of 8 frames.baselines", "pulling_sharp_blocks16_seed?.json"
 CLAMPED = "tradeoff_cutting_sharp.json"
 TRUTH, PULL = "effects_truth.json", "scenes.pull and breath"
 VIEWS, WITHOUT, OF_SHARP = "sweeps/other_views.json", "other_views.json", "rows.*configuration=sharp.measures"
@@ -94,7 +94,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "truth.still.light": Figure(TRUTH, "scenes.light.`paper` without S.*.depth_mm", "{:.3f}"),
     "sharp.blocks16": Figure(BLOCKS16, "held_out.mean.psnr_tissue", "{:.2f}"),
     "sharp.fade16": Figure(BLOCKS16, "cross_fade.mean.psnr_tissue", "{:.2f}"),
-    "sharp.blocks8": Figure("pulling_sharp_blocks8.json", "held_out.mean.psnr_tissue", "{:.2f}"),
+    "sharp.blocks8": Figure("pulling_sharp_blocks8_seed?.json", "held_out.mean.psnr_tissue", "{:.2f}"),
     "rife.blocks8": Figure("network.json", f"{BLOCKS8}.network.psnr_tissue", "{:.2f}"),
     "flow.frame1": Figure(PULLING, "baselines.flow_interpolation.per_frame.0.psnr_tissue", "{:.2f}"),
     "workload.focal": Setting("endotsr.training.scene.workload:FOCAL"),

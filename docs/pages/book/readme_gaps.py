@@ -19,9 +19,9 @@ Values = NDArray[np.float64]  # by held-out frame
 
 GAPS = {  # frames missing in a row: records of `sharp`, split of the interpolation
     1: ("pulling_sharp_seed?.json", "every eighth frame"),
-    4: ("pulling_sharp_blocks4.json", "blocks of 4 frames"),
-    8: ("pulling_sharp_blocks8.json", "blocks of 8 frames"),
-    16: ("pulling_sharp_blocks16.json", "blocks of 16 frames"),
+    4: ("pulling_sharp_blocks4_seed?.json", "blocks of 4 frames"),
+    8: ("pulling_sharp_blocks8_seed?.json", "blocks of 8 frames"),
+    16: ("pulling_sharp_blocks16_seed?.json", "blocks of 16 frames"),
 }
 FLOW, BLEND, COPY, RIFE = "flow_interpolation", "two_neighbours", "nearest_frame", "network"
 TISSUE = f"{FLOW}_tissue"

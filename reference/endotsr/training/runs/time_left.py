@@ -4,6 +4,7 @@ In: the settings, the numbers of frames, and what each iteration took. Out: seco
 frames is no part of the time of an iteration: it is counted separately, and ends when every gap has its targets.
 """
 
+import math
 import statistics
 from collections import deque
 from collections.abc import Iterable
@@ -72,14 +73,16 @@ class TimeLeft:
     def unit(self) -> float | None:
         """Seconds per unit of work; None = too few iterations, or too few without the second thread up to now.
 
-        While the second thread makes targets, the speed that was timed before is more exact than theirs.
+        While the second thread makes targets, it is the geometric mean with the speed that was timed before: on three
+        clips one of the two was too long and the other one too short.
         """
+        found, before = unit_seconds(self._timed, SLOWED / self._plan.threads), self._plan.unit
         if any(one.beside for one in self._timed) and len(quiet(self._timed)) < LEAST_QUIET:
-            if self._plan.unit is not None:
-                return within(self._timed, self._plan.unit)
+            if before is not None:
+                return None if found is None else math.sqrt(found * within(self._timed, before))
             if self._seconds < PATIENCE:
                 return None
-        return unit_seconds(self._timed, SLOWED / self._plan.threads)
+        return found
 
     def seconds(self, standing: Standing) -> float | None:
         """Seconds from here to the end of the iterations; None = the speed is unknown yet."""
@@ -126,14 +129,12 @@ def unit_seconds(timed: Iterable[Timed], slowed: float) -> float | None:
     return max((sum(one.seconds for one in kept) - lost) / sum(one.work for one in kept), min(each) / 2)
 
 
-def within(timed: Iterable[Timed], before: float) -> float | None:
-    """Seconds per unit of work, as timed before, if the iterations do not contradict it; None = too few of them.
+def within(timed: Iterable[Timed], before: float) -> float:
+    """Seconds per unit of work, as timed before, if the iterations do not contradict it.
 
     Edges:   the median iteration at most, since a second thread makes none faster, and half of the fastest at least
     """
     each = [one.seconds / one.work for one in timed]
-    if len(each) < LEAST_ITERATIONS:
-        return None
     return max(min(before, statistics.median(each)), min(each) / 2)
 
 
