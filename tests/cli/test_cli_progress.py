@@ -225,9 +225,7 @@ def test_a_speed_that_was_timed_before_counts_while_the_second_thread_works():
             work = float(iteration_work(16_000, PIXELS, k / told._plan.config.training.iterations))
             told.add(progress.Standing(k, 16_000), 0.1 * work, Making(k, 0.0, 0.02 * work * k))
         alone = 0.1 - SLOWED / 2 * 0.02
-        assert told.unit == pytest.approx((alone * found) ** 0.5), (
-            "the mean with the speed of the iterations themselves"
-        )
+        assert told.unit == pytest.approx((alone * found) ** 0.5, rel=0.01), "the mean of both speeds"
     for k in range(6, 8 + LEAST_QUIET):
         told.add(progress.Standing(k, 16_000), 0.06 * work, Making(5, 0.0, 1.5))
     assert told.unit == pytest.approx(0.06, rel=0.01), "its own iterations count as soon as there are enough"
