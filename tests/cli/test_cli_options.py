@@ -166,6 +166,8 @@ PRESETS_ALLOWED = "is not allowed; use one of paper, sharp, quick, demo\n"
         ("render run --frames 12 --out y", "the view of one frame is --camera FRAME"),
         ("train simulated --out=", "--out '' is not allowed; use a path"),
         # a mistyped option is named before the words that are missing
+        ("tradeoff .", "'.': unexpected argument; if the result goes there: --out .; `endotsr"),  # takes no path
+        ("train simulated .", "'.': a second path; give one, such as the folder"),
         ("train simulated runs/a", "'runs/a': unexpected argument; if the result goes there: --out runs/a; `endotsr"),
         ("simulate breathing --size 96x80", "--size: no such option; use --width and --height\n"),
         ("render --ot x", "--ot: no such option; did you mean --out?"),

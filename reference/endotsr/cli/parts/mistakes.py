@@ -23,7 +23,7 @@ def unknown_word(fields: list[Field], words: list[str], command: str, has_result
     option = next((word.split("=")[0] for word in words if word.startswith("-")), None)
     names = option_names(fields)
     if option is None:
-        if os.path.exists(words[0]):
+        if os.path.exists(words[0]) and any(field.positional for field in fields):
             return InputError(f"{words[0]!r}: a second path; give one, such as the folder that holds all pictures")
         result = f"if the result goes there: --out {words[0]}; " if "--out" in names and not has_result else ""
         return InputError(f"{words[0]!r}: unexpected argument; {result}`endotsr {command} --help` lists the options")
