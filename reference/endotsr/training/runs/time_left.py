@@ -85,9 +85,9 @@ class TimeLeft:
         return found
 
     def seconds(self, standing: Standing) -> float | None:
-        """Seconds from here to the end of the iterations; None = the speed is unknown yet."""
+        """Seconds from here to the end of the iterations; None = speed or end of a coarse start is unknown."""
         unit = self.unit
-        if unit is None:
+        if unit is None or (standing.coarse and not standing.coarse_until):
             return None
         plan = self._plan
         return unit * work_left(plan.config, plan.pixels, standing, plan.vectors) + self._targets(unit, standing)
