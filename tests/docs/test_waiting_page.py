@@ -13,7 +13,7 @@ RISEN = {  # asked for: 0.1; the page shows these rises
     ("endonerf_cutting", "sharp", "wall"): 0.14,  # with AVX-512 on one machine; 0.03 and 0.07 on two others
     # before the parts of an iteration depended on the vectors, and the second thread slowed it by more than its share
     ("simulated_breathing", "sharp", "wall"): 0.15,
-    ("simulated_breathing", "quick", "wall"): 0.35,  # before no time left was shown up to the first check of its start
+    ("simulated_breathing", "quick", "wall"): 0.35,  # the cause is not known
 }
 MISSED = {  # the page says so; by the bytes of a register: 32 = AVX2, 64 = AVX-512
     ("endonerf_cutting", "sharp", "AMD EPYC", 32, "forecast"): 0.23,
