@@ -2,6 +2,7 @@
 
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import msgspec
 import numpy as np
@@ -78,7 +79,13 @@ def test_values_are_dropped_oldest_first_and_made_again():
     assert bytes_of((shared, [shared], {"a": np.zeros(2, np.int16)}, None)) == 68
 
 
+def disk_of(free, monkeypatch):
+    """The free disk is stated: that of the machine of the tests may be as good as full."""
+    monkeypatch.setattr("shutil.disk_usage", lambda place: SimpleNamespace(free=free))
+
+
 def test_the_limit_is_half_of_the_machine_unless_it_is_stated(monkeypatch):
+    disk_of(1e11, monkeypatch)
     assert memory_limit(2.5) == 2.5e9
     monkeypatch.setattr("endotsr.method.kernels.memory.memory_of_machine", lambda: 8e9)
     assert memory_limit(0.0) == 4e9 and FrameStore(2000, 640, 512, 0.0, "clip").in_file
@@ -88,6 +95,7 @@ def test_the_limit_is_half_of_the_machine_unless_it_is_stated(monkeypatch):
 
 
 def test_unknown_memory_is_said_and_refuses_what_no_machine_holds(monkeypatch):
+    disk_of(1e11, monkeypatch)
     monkeypatch.setattr("endotsr.method.kernels.memory.memory_of_machine", lambda: None)
     assert "4 GB assumed; sequence.memory states it" in FrameStore(2000, 640, 512, 0.0, "clip").note
     assert "assumed" not in FrameStore(2000, 640, 512, 1.0, "clip").note
