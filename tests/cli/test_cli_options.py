@@ -137,6 +137,11 @@ def test_unusable_setting_is_one_line(words, named, tmp_path, capsys):
         (["--ou", "y2"], "--ou: no such option; did you mean --out?"),
         (["--excluded-value", "black"], "--excluded-value: no such option; did you mean --sequence.excluded-value?"),
         (["--resum"], "--resum: no such option; did you mean --resume?"),
+        (["--epochs", "9"], "--epochs: no such option; did you mean --iterations?"),
+        (["--model_path", "y2"], "--model-path: no such option; did you mean --out?"),
+        (["-s", "clip"], "-s: no such option; write SEQUENCE without an option: `endotsr train SEQUENCE`"),
+        (["--device", "cuda"], "--device: no such option; the computation is on the CPU; --threads states how many"),
+        (["--fps", "9"], "--fps: no such option; `endotsr train --help` lists the options"),  # train has no such rate
         (["--frobnicate"], "--frobnicate: no such option; `endotsr train --help` lists the options"),
         (
             ["\N{EM DASH}scale", "0.5"],

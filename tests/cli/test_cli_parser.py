@@ -116,7 +116,7 @@ def test_several_values_and_none():
         (("--level", "3k"), "--level '3k' is not allowed; use 0 or 5"),
         (("--fast=maybe",), "--fast 'maybe' is not allowed; use true or false"),
         (("--offset", "low"), "--offset 'low' is not allowed; use a number"),
-        (("-o", "x"), "-o: no such option; `endotsr try --help` lists the options"),
+        (("-o", "x"), "-o: no such option; did you mean --out?"),
         (("--model.beta.x", "1"), "--model.beta.x: no such option; did you mean --model.beta?"),
         (("--model.base", "1"), "command line: unknown key model.base; use one of appearance"),
         (("--odd.beta", "1"), "command line: unknown key odd; use one of sequence, model, raster"),

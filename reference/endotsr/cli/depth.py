@@ -45,7 +45,7 @@ class DepthOptions:
     farthest_over_nearest: float = 3.0
     """with --kind relative and no reference depth: assumed ratio of the farthest to the nearest tissue"""
     trust_depth: bool = False
-    """with --kind relative: accept values that are large at dark pixels"""
+    """with --kind depth or relative: read these files so, even if the pictures or the numbers contradict it"""
     flat: bool = False
     """assume a plane parallel to the image, for a clip without any depth"""
     unit_scale: float = 1.0
@@ -143,7 +143,7 @@ def _made(options: DepthOptions) -> "DepthReport":
         farthest, trusted = options.farthest_over_nearest, options.trust_depth
         made = from_relative(folder, given, options.align, farthest, trusted, options.replace, options.pairing)
     elif given is not None and options.kind != "relative":
-        made = from_files(folder, given, options.kind, options.unit_scale, options.pairing)
+        made = from_files(folder, given, options.kind, options.unit_scale, options.pairing, options.trust_depth)
     else:
         made = from_pairs(folder, options.stereo)
     return write_depth(folder, made, options.replace, _show_count)

@@ -12,6 +12,22 @@ LIKE_ENOUGH = 0.7  # minimum similarity of a suggested option
 LAST_NAME_ONLY = 0.95  # factor for a setting named without its section, to prefer an option of that name
 MOST_OFFERED = 3
 OF_PICTURE, SIDES = ("--size", "--resolution"), ("--width", "--height")  # words for both sides of a picture
+AS_ELSEWHERE = {  # words of other programs -> options of this package that mean the same, as far as a command has them
+    "fps framerate frame-rate": ("--rate", "--source-rate"),
+    "resize downscale downsample downscale-factor resolution-scale": ("--scale",),
+    "epochs steps max-steps num-iterations max-iterations iters n-iters": ("--iterations",),
+    "o output output-dir output-path output-folder save-dir dest model-path m": ("--out", "--film"),
+    "start end start-frame end-frame first last skip stride every": ("--frames",),
+    "fov hfov": ("--field-of-view",),
+    "intrinsics k focal focal-length": ("--camera", "--calibration"),
+    "poses extrinsics pose-file": ("--trajectory",),
+    "force overwrite f y": ("--replace",),
+    "invert invert-masks inverted": ("--excluded-value",),
+    "workers num-workers num-threads jobs j": ("--threads",),
+}
+ELSEWHERE = {f"--{word}": meant for words, meant in AS_ELSEWHERE.items() for word in words.split()}
+SOURCE = "source source-path s input input-dir i data data-dir dataset video".split()
+DEVICE = "gpu gpus cuda device".split()
 OTHER_DASHES = "\N{EM DASH}\N{EN DASH}\N{MINUS SIGN}"  # that text programs make of hyphens
 
 
@@ -34,9 +50,19 @@ def unknown_word(fields: list[Field], words: list[str], command: str, has_result
         return InputError(f"command line: {unknown_key}")
     if option in OF_PICTURE and set(SIDES) <= set(names):
         return InputError(f"{option}: no such option; use {' and '.join(SIDES)}")
-    offered = _similar(option, names)
-    advice = f"did you mean {' or '.join(offered)}?" if offered else f"`endotsr {command} --help` lists the options"
-    return InputError(f"{option}: no such option; {advice}")
+    return InputError(f"{option}: no such option; {_advice(option, fields, names, command)}")
+
+
+def _advice(option: str, fields: list[Field], names: list[str], command: str) -> str:
+    """What to write in place of an unknown option; options of other programs are known by their meaning."""
+    word = option.lstrip("-").replace("_", "-").lower()
+    first = next((field for field in fields if field.positional), None)
+    if word in SOURCE and first is not None:
+        return f"write {first.name} without an option: `endotsr {command} {first.name}`"
+    if word in DEVICE:
+        return "the computation is on the CPU" + ("; --threads states how many" * ("--threads" in names))
+    offered = [name for name in ELSEWHERE.get(f"--{word}", ()) if name in names] or _similar(option, names)
+    return f"did you mean {' or '.join(offered)}?" if offered else f"`endotsr {command} --help` lists the options"
 
 
 def refuse_other_dashes(fields: list[Field], words: list[str]) -> None:

@@ -57,10 +57,11 @@ DEPTH = (
     Excludes(("flat",), ("given",), "a plane reads no files"),
     Needs(OF_FILES, ("given",), "it describes the files of another program"),
     Needs(
-        ("align", "farthest-over-nearest", "trust-depth"),
+        ("align", "farthest-over-nearest"),
         ("kind=relative",),
         "only relative depth has a scale and a shift to fit",
     ),
+    Needs(("trust-depth",), ("kind=relative", "kind=depth"), "disparities are not held against the pictures"),
     Excludes(("unit-scale",), ("kind=relative",), "the scale of relative depth is fitted or assumed"),
     Excludes(("given", "flat"), OF_PAIRS, "it sets the matching of stereo pairs"),
     Excludes(("no-smooth",), ("confidence",), "the confidence is that of the smoothing"),

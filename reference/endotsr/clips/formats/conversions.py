@@ -18,6 +18,11 @@ FRAMES_FIRST = "; NAME: of the variable; an array of all frames needs the axis o
 def conversion(path: Path, ending: str = "") -> str:
     """The end of a message on a file, or on the files of a folder with this ending; empty for another container."""
     ending = ending or path.suffix.lower()
+    if ending == ".json":
+        return (
+            "; outlines of an annotation program are not read: for masks, let it export one picture per frame (COCO in"
+            " Python: pycocotools, COCO(FILE).annToMask(ANNOTATION))"
+        )
     if ending not in LOADS:
         return ""
     package, load = LOADS[ending]

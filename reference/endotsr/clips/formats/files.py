@@ -116,7 +116,7 @@ def _check_same_keys(here: list, there: list, reference: list[Path], other: list
         if lonely is not None:
             raise InputError(
                 f"{missing_files[0].parent}: has no file for frame {_text(keys[lonely])}"
-                f" ({files[0].parent.name}/{files[lonely].name}); {_counts(reference, other)}"
+                f" ({files[0].parent.name}/{files[lonely].name}); {_counts(reference, other)}; use one per frame"
             )
     if here != there:  # two spellings of one name, such as a.png and a.PNG
         raise InputError(f"{other[0].parent}: the files do not match one to one; {_counts(reference, other)}")

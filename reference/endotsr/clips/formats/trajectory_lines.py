@@ -214,7 +214,11 @@ def _named_columns(line: str) -> list[str]:
     plain = re.sub(r"\[[^\]]*\]|\([^)]*\)|[#\"]", " ", line).replace(";", ",")
     words = [word.strip() for word in (plain.split(",") if "," in plain else plain.split())]
     found = []
+    four = {word.lower() for word in words} >= {"rx", "ry", "rz", "rw"}  # a quaternion by its fourth number
     for k, word in enumerate(word for word in words if word):
+        if four and word.lower() in ("rx", "ry", "rz", "rw"):
+            found.append(f"q{word[1].lower()}")
+            continue
         lower = re.sub(r"_(?:um|mm|cm|m)$", "", MESSAGE.sub("", re.sub(r"\s+", "_", word.lower())))
         if turned := QUATERNION.fullmatch(lower):
             found.append(f"q{turned[1]}")

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.formats.clocks import Clock, clock_of
-from endotsr.clips.formats.video_marks import container_notes
+from endotsr.clips.formats.video_marks import container_notes, without_index
 from endotsr.clips.formats.view_marks import ViewMarks, view_marks
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS, open_regular
@@ -334,11 +334,12 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
             container = av.open(file, "r", **options)
         except (av.error.FFmpegError, ValueError, MemoryError) as error:
             said = getattr(error, "strerror", None) or str(error)  # without the number of the open file
-            raise InputError(f"{path}: not a video that can be decoded: {plain_line(said)}") from None
+            lost = without_index(path)
+            raise InputError(f"{path}: not a video that can be decoded: {plain_line(said)}{lost}") from None
         with container:
             stream: Any = container.streams.best("video")
             if stream is None or stream.codec_context is None:
-                raise InputError(f"{path}: holds no pictures of a known codec")
+                raise InputError(f"{path}: holds no pictures of a known codec{without_index(path)}")
             if stream.codec_context.width * stream.codec_context.height > MOST_PIXELS:
                 size = f"{stream.codec_context.width}x{stream.codec_context.height}"
                 raise InputError(f"{path}: pictures of {size} pixels; use at most {MOST_PIXELS}")

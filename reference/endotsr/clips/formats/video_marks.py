@@ -107,6 +107,19 @@ def container_notes(path: Path) -> list[str]:
         return stream_notes(file, begin, path.name)
 
 
+def without_index(path: Path) -> str:
+    """The end of a message on an MP4 or MOV file that lacks its index, `moov`; "" for any other file."""
+    with open_regular(path, LARGEST_FILE) as file:
+        length = file.seek(0, 2)
+        names = [box.name for box in _boxes(file, 0, length)]
+    if "ftyp" not in names[:1] or "moov" in names:
+        return ""
+    return (
+        "; the index of its pictures (moov) is missing, which is written at the end of a recording: the recording or"
+        " the copy was cut off; copy the file again, or repair it with a program for such files, such as untrunc"
+    )
+
+
 def _mp4_fields(file: BufferedReader, length: int) -> dict[str, object]:
     """The boxes of the video tracks, with what decides: a crop that cuts nothing off is no crop."""
     moov = next((box for box in _boxes(file, 0, length) if box.name == "moov"), None)

@@ -50,8 +50,16 @@ class Agreement(NamedTuple):
             "fits": f"poses, depth and pictures agree ({base})",
             "doubtful": f"poses, depth and pictures agree only roughly ({base})",
             "misread": f"another reading explains the pictures: {self.reading} leaves {self.left:.2f} pixels; {base}",
-            "wrong": f"poses, depth and pictures do not agree, and no usual misreading explains them ({base})",
+            "wrong": f"poses, depth and pictures do not agree, and no usual misreading explains them ({base})"
+            + self._closest,
         }[self.verdict]
+
+    @property
+    def _closest(self) -> str:
+        """The misreading that leaves least, as the end of a sentence; "" if it leaves nearly as much as given poses."""
+        if not self.left < min(CLEARLY * self.given, self.still):
+            return ""
+        return f"; {self.reading} comes closest and leaves {self.left:.2f} pixels: {self.remedy}"
 
 
 def agreement(matcher: Matcher, poses: list[CameraPose], pairs: list[FramePair] | None = None) -> Agreement:

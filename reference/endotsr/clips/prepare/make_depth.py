@@ -5,6 +5,7 @@ In: the folder. Out: `depth/`, the section [depth] of its `sequence.toml`, and t
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace as replaced
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -16,9 +17,10 @@ from endotsr.clips.formats.camera import ARBITRARY, Intrinsics
 from endotsr.clips.formats.choices import Align, Pairing
 from endotsr.clips.formats.depth_stacks import stack_planes
 from endotsr.clips.prepare.relative_depth import MadeDepth, moves, relative_depth
+from endotsr.clips.prepare.stated_depth import refuse_no_lengths_given
 from endotsr.clips.prepare.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.clips.sequences.checks.depth import LITTLE, depth_facts, mark_finding
-from endotsr.clips.sequences.clip import Clip, PicturePair
+from endotsr.clips.sequences.clip import Clip, Depth, PicturePair
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane, step_of_depth, write_levels
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.pairing import every_frame
@@ -102,17 +104,27 @@ def from_pairs(folder: Path, settings: StereoSettings) -> MadeDepth:
     return MadeDepth(stereo_frames(describe_prepared(folder), settings), method, "")
 
 
-def from_files(folder: Path, source: Path, kind: Kind, scale: float, pairing: Pairing = "auto") -> MadeDepth:
-    """Depth from the files of another program, one per frame. Raises InputError as `from_pairs`."""
+def from_files(
+    folder: Path, source: Path, kind: Kind, scale: float, pairing: Pairing = "auto", trusted: bool = False
+) -> MadeDepth:
+    """Depth from the files of another program, one per frame.
+
+    trusted   take files of the kind `depth` as lengths even if values, light or the right view contradict it
+
+    Raises:  InputError as `from_pairs`, and for files of the kind `depth` that most likely hold no lengths.
+    """
     clip = describe_prepared(folder)
     files, note = every_frame(clip, stack_planes(source) or files_of(source, DEPTH_ENDINGS), pairing)
     intrinsics, baseline = clip.intrinsics, clip.baseline
     assert intrinsics is not None
-    frames = (
-        _without_mark(depth_of_values(read_plane(file), kind, scale, intrinsics, baseline, file), kind, file)
-        for file in files
-    )
-    return MadeDepth(frames, f"{kind} from {source.name}", "", note)
+
+    def depth(i: int) -> NDArray[np.float32]:
+        file = files[i]
+        return _without_mark(depth_of_values(read_plane(file), kind, scale, intrinsics, baseline, file), kind, file)
+
+    if kind == "depth" and not trusted:
+        refuse_no_lengths_given(replaced(clip, depth=Depth(depth, scale=scale, stated=source)))
+    return MadeDepth(map(depth, range(len(files))), f"{kind} from {source.name}", "", note)
 
 
 def depth_of_values(

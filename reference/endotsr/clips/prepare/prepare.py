@@ -147,7 +147,10 @@ def _poses_and_masks(
         if len(frames) == len(chosen):
             raise InputError(f"{clip.where}: {named}; use --frames some of which have one")
         if gaps == "refuse":
-            raise InputError(f"{clip.where}: {named}; use --gaps drop (without these) or --gaps fill")
+            paired = (
+                f" ({clip.masks.paired})" if what == "mask" and clip.masks is not None and clip.masks.paired else ""
+            )
+            raise InputError(f"{clip.where}: {named}{paired}; use --gaps drop (without these) or --gaps fill")
         filling = "poses are interpolated" if what == "pose" else "the mask of the nearest frame is used"
         notes.append(f"{named}; {'left out' if gaps == 'drop' else filling}")
     if gaps != "refuse" and not any(lacking.values()):

@@ -147,7 +147,7 @@ def _aligned(clip: Clip, relative: Callable[[int], FloatArray], source: Path, al
         if line.scale <= 0:
             raise InputError(
                 f"{source}: frame {clip.names[i]}: the values decrease towards the camera, according to"
-                f" the depth of {clip.where.name}; use a relative inverse depth, larger = nearer"
+                f" the depth of {clip.where.name}; use a relative inverse depth, larger = nearer{_of_wrong_depth(clip)}"
             )
         found, z = line.depth(reference[i][0]), reference[i][1]
         apart.append(np.abs(found - z)[z > 0] / z[z > 0])
@@ -159,6 +159,22 @@ def _aligned(clip: Clip, relative: Callable[[int], FloatArray], source: Path, al
     ) + (f"; scale and shift of the nearest frame for {shortened(borrowed)}" if borrowed else "")
     frames = (line.depth(relative(i)) for i, line in enumerate(chosen) if line is not None)
     return MadeDepth(frames, method, known.assumed)
+
+
+def _of_wrong_depth(clip: Clip) -> str:
+    """The end of a message where the light contradicts the depth that the clip has, with what removes it."""
+    known, light = clip.depth, []
+    assert known is not None
+    looked = list(range(min(LOOKED_AT, clip.count)))
+    for i, pair in zip(looked, clip.pictures(looked)):
+        if (depth := known(i)) is not None:
+            light.append(light_correlation(pair.left, depth, clip.masks(i) if clip.masks else None))
+    if not (found := light_finding(light, str(clip.where))):
+        return ""
+    return (
+        f"; but {found[0].what}: the depth of {clip.where.name} may be the wrong one: prepare the clip again without"
+        " depth, and repeat the command"
+    )
 
 
 def _sampled(relative: FloatArray, depth: NDArray[np.float32] | None, most: int) -> FloatArray:

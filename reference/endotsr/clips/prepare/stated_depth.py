@@ -41,6 +41,11 @@ REMEDY = (
     " relative inverse depth with --kind relative; --trust-depth reads the files as lengths anyway"
 )
 
+REMEDY_GIVEN = (
+    "--kind relative reads a relative inverse depth, larger = nearer, and --kind disparity a disparity; --trust-depth"
+    " reads the files as lengths anyway"
+)
+
 
 def refuse_no_lengths(clip: Clip, chosen: list[int]) -> None:
     """Raises InputError if the stated depth of a clip most likely contains no lengths.
@@ -55,13 +60,22 @@ def refuse_no_lengths(clip: Clip, chosen: list[int]) -> None:
         raise InputError(f"{depth.stated}: {found}; {REMEDY}")
 
 
+def refuse_no_lengths_given(clip: Clip) -> None:
+    """As `refuse_no_lengths`, for files whose kind is stated as depth: their names and their unit are no evidence."""
+    depth = clip.depth
+    assert depth is not None and depth.stated is not None
+    found = _of_values(clip, depth.stated, list(range(min(LOOKED_AT, clip.count))), with_unit=False)
+    if found:
+        raise InputError(f"{depth.stated}: {found}; {REMEDY_GIVEN}")
+
+
 def _of_names(path: Path) -> str:
     names = [path.name, *(file.name for file in sorted(path.iterdir())[:1])] if path.is_dir() else [path.name]
     named = next((name for name in names if NAMES.search(name.lower())), None)
     return f"the name {named} indicates a disparity or a relative depth" if named else ""
 
 
-def _of_values(clip: Clip, path: Path, frames: list[int]) -> str:
+def _of_values(clip: Clip, path: Path, frames: list[int], with_unit: bool = True) -> str:
     """Evidence against lengths in the values and in comparison with the pictures; "" without any.
 
     Raises:  InputError for depth that is upside down or mirrored, whose largest value marks missing depth, or whose
@@ -96,7 +110,7 @@ def _of_values(clip: Clip, path: Path, frames: list[int]) -> str:
         raise InputError(f"{path}: {marked[0].what}: {marked[0].why}; {marked[0].remedy}, or --trust-depth")
     if len(planes) > 2 and (full := _full_scale([plane / read.scale for plane in planes])):
         return full
-    unit = [] if clip.arbitrary else unit_finding(usual_depth(facts), where)
+    unit = [] if clip.arbitrary or not with_unit else unit_finding(usual_depth(facts), where)
     if unit:
         return f"{unit[0].what}; state another unit with --depth-unit and --depth-scale"
     if any(bytes_exchanged(plane / read.scale) for plane in planes):

@@ -93,7 +93,7 @@ def straightener(clip: Clip, width: int, height: int, scale: float) -> Straighte
     if (intrinsics.width, intrinsics.height) != (width, height):
         raise InputError(
             f"{clip.where}: the intrinsics are of {intrinsics.width}x{intrinsics.height} pixels, the pictures have"
-            f" {width}x{height}"
+            f" {width}x{height}{_resized(intrinsics, width, height)}"
         )
     clipped = clip.depth is not None and bool(clip.depth.clipped)
     if not any(intrinsics.distortion):
@@ -107,6 +107,16 @@ def straightener(clip: Clip, width: int, height: int, scale: float) -> Straighte
     notes += lens_warnings(maps.matrix, np.array(intrinsics.distortion), width, height)
     resized = new_size != (width, height)
     return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), clip.baseline, notes, clipped, resized)
+
+
+def _resized(intrinsics: Intrinsics, width: int, height: int) -> str:
+    """The end of a message on pictures of another size than the intrinsics, with the remedy."""
+    factor = width / intrinsics.width
+    alike = abs(height - factor * intrinsics.height) <= 1  # the same shape, up to rounding
+    if not alike:
+        return "; use the pictures from which the intrinsics were made: these were cropped or squeezed"
+    reduced = f", and --scale {factor:.4g}" if factor < 1 else ""
+    return f"; use pictures of {intrinsics.width}x{intrinsics.height}{reduced}"
 
 
 def _calibrations_beside(source: Path) -> str:

@@ -60,6 +60,11 @@ def paired(
     if chosen is None:
         _refuse_names(frames, files, _order_hint(count, files))
     notes = [f"{files[0].parent.name}: paired by {WAYS[way]}"] if way == "source" else []
+    if in_one_file and len(files) < count and way == "number":
+        notes.append(
+            f"{files[0].parent.name}: its {len(files)} pictures belong to the first {len(files)} of {count} frames, one"
+            " each; if it has another frame rate, write one picture per frame"
+        )
     return Paired(chosen, "; ".join([*notes, *of_no_or_all_frames(files, chosen)]))
 
 

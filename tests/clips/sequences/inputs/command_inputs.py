@@ -139,6 +139,21 @@ def given(folder: Path, factor: float) -> list[str]:
     return ["depth", prepared(folder), "--given", str(folder / "d"), "--kind", "depth"]
 
 
+@builder
+def given_inverse(folder: Path, kind: str, *words: str, then: tuple[str, ...] = ()) -> list[str]:
+    """Inverse depth of a network in 8 bits, each frame stretched to the full range, for pictures that it lights."""
+    near = [1 / true_depth(i) for i in range(12)]
+    planes = [np.round(255 * (x - x.min()) / (x.max() - x.min())).astype(np.uint8) for x in near]
+    shown = [np.stack([60 + plane * 0.7, plane * 0.4, plane * 0.3], axis=2).astype(np.uint8) for plane in planes]
+    main(folder_of(shown)(folder))
+    files(folder, "d", planes, "png")
+    command = ["depth", str(folder / "o"), "--given", str(folder / "d"), "--kind", kind, *words]
+    if not then:
+        return command
+    main(command)
+    return [*command[:4], *then]
+
+
 def videos(folder: Path) -> None:
     folder.mkdir()
     for name in ("part 1.mp4", "part 2.mp4"):
@@ -238,5 +253,14 @@ COMMAND_ROWS = [
         "use a number, with a decimal point (29.97)"),
     refused("baseline with a unit", twelve("--baseline", "4.2 mm"), "use a number, without a unit (4.2)"),
     refused("frames in words", twelve("--frames", "first"), "'first': not a range"),
+    *(refused(f"{word} of other programs", twelve(*word.split()), said) for word, said in (("--fps 10",
+        "did you mean --rate or --source-rate?"), ("--resize 0.5", "did you mean --scale?"), ("-f",
+        "did you mean --replace?"), ("--gpu", "the computation is on the CPU"), ("--input clip",
+        "write SOURCE without an option"), ("--intrinsics k.txt", "did you mean --camera or --calibration?"))),
+    refused("depth, relative inverse depth of 8 bits given as depth", given_inverse("depth"),
+        "the frames are stretched to the full range; --kind relative reads"),
+    told("depth, relative inverse depth of 8 bits, the remedy", given_inverse("relative"), "not metric"),
+    refused("depth, relative inverse depth fitted to wrong depth", given_inverse("depth", "--trust-depth",
+        then=("--kind", "relative", "--replace")), "may be the wrong one: prepare the clip again without depth"),
     refused("an option behind the dash of a text program", twelve("\N{EM DASH}scale", "0.5"), "did you mean --scale?"),
 ]  # fmt: skip

@@ -96,7 +96,8 @@ def rewritten(folder: Path, change=lambda opened: opened, ending="png", **how) -
         with Image.open(file) as opened:
             made = change(opened.copy())
         file.unlink()
-        made.save(file.with_suffix(f".{ending}"), **how)
+        more = [each.copy() for each in how.get("append_images", ())]  # saving as MPO leaves its settings in a picture
+        made.save(file.with_suffix(f".{ending}"), **(how | {"append_images": more} if more else how))
 
 
 @builder

@@ -65,6 +65,11 @@ def turned_first(found: np.ndarray) -> np.ndarray:
     return np.column_stack([np.arange(len(found)), quaternions(found), found[:, :, 3]])
 
 
+def of_unity(found: np.ndarray) -> np.ndarray:
+    """Position, quaternion and seconds, as EndoSLAM has them."""
+    return np.column_stack([found[:, :, 3], quaternions(found), np.arange(len(found)) / 30])
+
+
 def as_vectors(found: np.ndarray) -> np.ndarray:
     """The rotation as a vector in radians before the position, as solvePnP of OpenCV gives it."""
     vectors = Rotation.from_matrix(found[:, :, :3]).as_rotvec()
@@ -132,6 +137,8 @@ POSE_ROWS = [
         "rotations are vectors in radians by the head line", true_poses),
     refused("trajectory, rotation vectors or angles", with_poses("t.csv", as_vectors, headed("frame,rx,ry,rz,tx,ty,tz",
         ",")), "rx ry rz: angles, or a rotation vector; angles are not read: write quaternions"),
+    told("trajectory, a quaternion named rX rY rZ rW", with_poses("t.csv", of_unity,
+        headed("tX,tY,tZ,rX,rY,rZ,rW,time", ",")), "quaternions are x y z w by the head line", true_poses),
     refused("trajectory, rotation vectors in degrees", trajectory(["# stamp tx ty tz rvec0 rvec1 rvec2",
         *(f"{i} 0 0 {i} 0 90 0" for i in range(12))]), "the rotation vector has length 90; use radians"),
     told("trajectory of EuRoC with seventeen columns", with_poses("data.csv", of_euroc, headed(EUROC_HEAD, ",")),

@@ -180,7 +180,7 @@ VIDEO_ROWS = [
         "BT.601 is assumed, but players assume BT.709", close(WIDE)),
     right("video, one picture", video("a.mp4", pictures(1)), lambda folder: read_sequence_file(folder / "o").frames ==
         1),
-    refused("video, truncated mp4, index at the end", video("a.mp4", change=cut(0.7)), "holds no pictures"),
+    refused("video, truncated mp4, index at the end", video("a.mp4", change=cut(0.7)), "(moov) is missing"),
     refused("video, truncated mp4, index in front", video("a.mp4", pictures(40), options={"bf": "0"},
         container={"movflags": "faststart"}, change=cut(0.7)), "truncated or damaged"),
     refused("video, damaged H.264", video("a.mp4", pictures(40), options={"qp": "4"}, change=changed_bytes(scratched)),

@@ -24,6 +24,7 @@ from endotsr.clips.sequences.checks.light import light_findings
 from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings
 from endotsr.clips.sequences.sampling import small_picture
 from endotsr.clips.sequences.times import evenly_spaced, usual_rate
+from endotsr.untrusted.names import counted
 
 BLACK, WHITE = 6.0, 249.0  # mean grey level
 FROZEN = 0.5  # as SAME, from the first frame of a clip to any other; encoders refine a still picture
@@ -198,5 +199,5 @@ def _number_gaps(files: list[Path]) -> list[Finding]:
     if not wide.size:
         return []
     i = int(wide[0])
-    what = f"{wide.size} gaps in the numbers; the first is between {files[i].name} and {files[i + 1].name}"
+    what = f"{counted(wide.size, 'gap')} in the numbers; the first is between {files[i].name} and {files[i + 1].name}"
     return [finding("number-gap", files[0].parent, what, i + 1)]

@@ -36,7 +36,8 @@ KINDS: dict[str, Kind] = {
     "images-files": Kind("refusal", "training reads them", "supply the images, one file per frame"),
     "masks-files": Kind("refusal", "training reads them", "supply the masks, one file per frame"),
     "depth-files": Kind("refusal", "training reads them", "supply the depth, one file per frame"),
-    "pairing": Kind("refusal", REFUSED, "supply or delete the file"),
+    "pairing": Kind("refusal", REFUSED, "supply the file, or omit the frame: delete its files in all folders, and its"
+                    " row in poses_bounds.npy"),
     "size": Kind("refusal", "all files of a sequence have one size", "export it again"),
     "frames": Kind("refusal", REFUSED, "more frames, or another split"),
     "picture-size": Kind("refusal", REFUSED, "another endotsr prepare --scale or --sequence.scale"),
