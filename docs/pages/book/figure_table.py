@@ -44,7 +44,12 @@ VIEWS, WITHOUT, OF_SHARP = "sweeps/other_views.json", "other_views.json", "rows.
 MODEL, MOVED = "rows.label=this model", "rows.label=left picture moved by the prior depth"
 FLOW = "rows.label=flow between the neighbours, moved by the blend of their depths"
 BLEND = "rows.label=blend of the neighbouring priors"
+WAITED = "rows.clip=endonerf_pulling&clock=wall&cold=False&register_bytes=64&processor=AMD EPYC&preset={}.whole"
+WAITED_MOST = "rows.clip=endonerf_pulling&clock=wall&cold=False&processor=Intel(R) Xeon(R) Processor&preset={}.whole"
 FIGURES: dict[str, Figure | Setting | Formula] = {
+    "wait.quick": Figure("waiting.json", WAITED.format("quick"), "{:.1f}", 1 / 60),
+    "wait.sharp": Figure("waiting.json", WAITED.format("sharp"), "{:.1f}", 1 / 60),
+    "wait.quick.most": Figure("waiting.json", WAITED_MOST.format("quick"), "{:.1f}", 1 / 60),
     "flow.tissue": Figure(PULLING, "baselines.flow_interpolation.mean.psnr_tissue", "{:.2f}"),
     "blend.tissue": Figure(PULLING, "baselines.two_neighbours.mean.psnr_tissue", "{:.2f}"),
     "sharp.tissue": Figure(SHARP, "held_out.mean.psnr_tissue", "{:.2f}"),
