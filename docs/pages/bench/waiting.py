@@ -42,6 +42,7 @@ from pages.store.kept import with_row
 from pages.store.program import CLIPS, LPIPS, Program
 
 MARKS = 10  # renders of every held-out frame, evenly over the iterations
+POINTS = 100  # of the stored course of the time left, evenly over the iterations
 MINUTE = 60.0
 KEYS = ("psnr_full", "psnr_tissue", "lpips")
 # A row replaces the row with these values.
@@ -71,7 +72,7 @@ class Heard:
     """What one command says, with the times at which it does."""
 
     def __init__(self, watch: Watch) -> None:
-        self.watch, self.said, self.curve = watch, {}, []
+        self.watch, self.said, self.curve, self.course = watch, {}, [], []
         self.trained, self.largest_rise, self._least = 0.0, 0.0, float("inf")
         self._about: LivePage | None = None
 
@@ -97,6 +98,8 @@ class Heard:
             self.trained = now
             left, unit = shown.time_left.seconds(at), shown.time_left.unit
             if left is not None and unit is not None and shown._done >= progress.FORECAST_AFTER:
+                if entry["iteration"] * POINTS // plan.config.training.iterations > len(self.course):
+                    self.course.append({"iteration": at.iteration, "at": now, "left": left, "unit": unit})
                 self._hear(now, left, estimated_seconds(plan, unit).evaluation)
             if entry["iteration"] * MARKS // plan.config.training.iterations > len(self.curve):
                 self.curve.append(self._point(shown, now, at))
@@ -152,6 +155,7 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         "iterations": about["iteration"], "gaussians": about["gaussians"], "said": spoken.said,
         "trained": spoken.trained, "whole": whole, "largest_rise": spoken.largest_rise,
         "forecast_after": progress.FORECAST_AFTER, "passes": 1, "blas_threads": 1, "curve": spoken.curve,
+        "course": spoken.course,
         "held_out": {key: metrics["held_out"]["mean"][key] for key in KEYS},
         "blend": {key: metrics["baselines"]["two_neighbours"]["mean"][key] for key in KEYS},
         "processor": here.get("processor"), "machine": here, "date": now()[:10],

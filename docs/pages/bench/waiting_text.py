@@ -1,4 +1,4 @@
-"""The table and the picture of docs/bench.md on what a training says about its time."""
+"""The tables and pictures of docs/bench.md on what a training says about its time."""
 
 from typing import Any
 
@@ -8,7 +8,9 @@ from pages.store import figures
 from pages.store.program import RESULTS
 from pages.store.tables import noted, numbers
 
-PICTURE = RESULTS / "waiting.svg"
+PICTURE, COURSE = RESULTS / "waiting.svg", RESULTS / "time_left.svg"
+BAND = 0.15  # of the time left, within which a forecast is asked to be
+SHOWN = 0.95  # of the training; at its end a second is a large part of the time left
 QUALITY = (("psnr_full", 2), ("psnr_tissue", 2), ("lpips", 4))
 COLOURS = (BLUE, GREEN, ORANGE, INK)
 CLOCKS = {"processor": "processor time of one thread", "wall": "two threads on the clock"}
@@ -40,7 +42,7 @@ def processor(row: dict[str, Any]) -> str:
 
 
 def said(result: dict[str, Any]) -> str:
-    """One row per command."""
+    """One row per command, and the picture of the time left."""
     rows = result["rows"]
     heads = ["Training", "Frames", "First line: said, left", "Forecast", "After a minute",
              "Largest rise", "Evaluation", "Whole command"]  # fmt: skip
@@ -53,7 +55,8 @@ def said(result: dict[str, Any]) -> str:
             [named(row), str(row["frames"]), first, told(row, "forecast"), told(row, "minute"),
              f"{row['largest_rise']:.0%}", evaluation, duration(row["whole"])]
         )  # fmt: skip
-    return noted(heads, cells, about(rows))
+    picture = f"![Error of the time left against the elapsed fraction of the training](results/{COURSE.name})"
+    return f"{noted(heads, cells, about(rows))}\n\n{picture}"
 
 
 def about(rows: list[dict[str, Any]]) -> str:
@@ -89,20 +92,38 @@ def quality(result: dict[str, Any]) -> str:
 
 
 def draw(result: dict[str, Any]) -> None:
-    """Held-out PSNR against processor seconds of training, a panel for each clip, with the level of the blend."""
-    rows = [row for row in result["rows"] if row["clock"] == "processor"]
+    """Both pictures, of the rows with the course of the time left, a panel for each clip."""
+    rows = [row for row in result["rows"] if row.get("course")]
     clips = list(dict.fromkeys(row["clip"] for row in rows))
-    figure = new_figure(3.7 * len(clips), 3.2)
-    for axes, clip in zip(figure.subplots(1, len(clips), squeeze=False)[0], clips, strict=True):
-        shown = [row for row in rows if row["clip"] == clip]
-        for row, colour in zip(shown, COLOURS * len(shown)):
-            start = row["said"]["start"]["at"] + row["said"]["start"]["initial"]
-            points = [(point["seconds"] - start, point["psnr_full"]) for point in row["curve"]]
-            label = f"{row['preset']}, {row['iterations']} iterations"
-            axes.plot(*zip(*points, strict=True), "o-", color=colour, markersize=3, label=label)
-        figures.level(axes, shown[0]["blend"]["psnr_full"], "blend")
-        axes.set_title(clip, fontsize=9)
-        name_axes(axes, "seconds of training", "held-out PSNR, dB")
-        plain_axes(axes)
-        legend(axes, loc="lower right")
-    save(figure, PICTURE)
+    for picture, panel in ((PICTURE, _draw_quality), (COURSE, _draw_course)):
+        figure = new_figure(3.7 * len(clips), 3.2)
+        for axes, clip in zip(figure.subplots(1, len(clips), squeeze=False)[0], clips, strict=True):
+            panel(axes, [row for row in rows if row["clip"] == clip])
+            axes.set_title(clip, fontsize=9)
+            plain_axes(axes)
+        save(figure, picture)
+
+
+def _draw_quality(axes: Any, rows: list[dict[str, Any]]) -> None:
+    """Held-out PSNR against seconds of training, with the level of the blend."""
+    for row, colour in zip(rows, COLOURS * len(rows)):
+        start = row["said"]["start"]["at"] + row["said"]["start"]["initial"]
+        points = [(point["seconds"] - start, point["psnr_full"]) for point in row["curve"]]
+        label = f"{row['preset']}, {row['iterations']} iterations"
+        axes.plot(*zip(*points, strict=True), "o-", color=colour, markersize=3, label=label)
+    figures.level(axes, rows[0]["blend"]["psnr_full"], "blend")
+    name_axes(axes, "seconds of training", "held-out PSNR, dB")
+    legend(axes, loc="lower right")
+
+
+def _draw_course(axes: Any, rows: list[dict[str, Any]]) -> None:
+    """The time left that was shown over the one that was left, minus one, against the fraction of the training."""
+    for row, colour in zip(rows, COLOURS * len(rows)):
+        end, begin = row["trained"], row["said"]["start"]["at"]
+        found = [((one["at"] - begin) / (end - begin), one["left"] / (end - one["at"]) - 1.0)
+                 for one in row["course"] if one["at"] - begin < SHOWN * (end - begin)]  # fmt: skip
+        axes.plot(*zip(*found, strict=True), "-", color=colour, label=row["preset"])
+    axes.axhspan(-BAND, BAND, color=INK, alpha=0.08, linewidth=0)
+    axes.set_ylim(-0.4, 0.4)
+    name_axes(axes, "elapsed fraction of the training", "time left: shown over true - 1")
+    legend(axes, loc="lower right")

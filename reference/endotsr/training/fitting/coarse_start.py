@@ -55,7 +55,8 @@ def coarse_ends(state: TrainingState, coarse: CoarseStart) -> bool:
     if state.iteration == 0 or state.iteration % CHECK_EVERY:
         return False
     error = fit_error(state, coarse.constants, coarse.frames)
-    state.coarse_until = expected_end(state.iteration, error, coarse)
+    found = expected_end(state.iteration, error, coarse)
+    state.coarse_until = (state.coarse_until + found) // 2 if state.coarse_until else found  # one check is a sample
     return error < coarse.lacking  # (20.5)
 
 

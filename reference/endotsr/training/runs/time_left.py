@@ -22,10 +22,16 @@ SPIKE = 4.0  # medians; longer iterations are left out, such as those that compi
 # Seconds, times the threads, by which one second of the second thread prolongs the iterations: 0.82 and 0.83 on two
 # cores (AMD EPYC), in the first 100 iterations of `sharp` on EndoNeRF cutting, two runs; 0.67 to 0.79 on an Intel Xeon
 # with full frames and 0.52 to 0.63 with half ones, four runs of `quick` on pulling. A guess at the cause: of three
-# threads on two cores, a parallel loop waits for the one that shares a core. Used below LEAST_QUIET quiet iterations.
+# threads on two cores, a parallel loop waits for the one that shares a core.
 SLOWED = 1.6
-LEAST_QUIET = 8
-PATIENCE = 30.0  # seconds of iterations for which these are awaited; until then the time left is unknown
+# Weights of known speeds: timed before, beside the second thread, in a coarse start. Of six choices that were tried on
+# one run each of `quick` on two recorded clips and a simulated one, these had the smallest rises of the time left.
+BEFORE, BESIDE, COARSE = 2.0, 0.5, 1.0
+LEAST_QUIET = 8  # iterations without the second thread; that many full ones have the weight 1
+PATIENCE = 30.0  # seconds for which these are awaited on a machine without a speed; the time left is unknown until then
+# Iterations of a coarse start, or beside the second thread, after which more add no weight. A coarse start is checked
+# once in that many, and such an iteration took up to 3.7 times as long.
+MANY = 50
 QUIET_AFTER, QUIET_BEFORE = 1, 8  # iterations of the distance to the last finished target, and to the next one
 PIXELS_OF_FULL = 4  # times those of a frame of a coarse start
 # Weight of the time expected of a gap, in gaps. The first ones are no measure: after the coarse start of `quick` on
@@ -40,6 +46,7 @@ class Timed(NamedTuple):
     work: float
     waited: float  # seconds for targets
     beside: float  # seconds of the second thread
+    coarse: bool = False  # with frames of half size
 
 
 class TimeLeft:
@@ -67,22 +74,33 @@ class TimeLeft:
         progress = standing.iteration / self._plan.config.training.iterations
         work = iteration_work(standing.gaussians, self._seen(standing.coarse), progress, self._plan.vectors)
         self._seconds += seconds
-        self._timed.append(Timed(max(seconds - waited, 0.0), float(work), waited, beside))
+        self._timed.append(Timed(max(seconds - waited, 0.0), float(work), waited, beside, standing.coarse))
 
     @property
     def unit(self) -> float | None:
-        """Seconds per unit of work; None = too few iterations, or too few without the second thread up to now.
+        """Seconds per unit of work, as the geometric mean of several speeds; None = too few iterations up to now.
 
-        While the second thread makes targets, it is the geometric mean with the speed that was timed before: on three
-        clips one of the two was too long and the other one too short.
+        These are the speed that was timed before, that of the iterations beside the second thread, that of a coarse
+        start without it, and that of full frames without it. Each of the first three was wrong by up to a quarter in
+        some run, in either direction; the weight of the last one grows with the number of its iterations.
         """
-        found, before = unit_seconds(self._timed, SLOWED / self._plan.threads), self._plan.unit
-        if any(one.beside for one in self._timed) and len(quiet(self._timed)) < LEAST_QUIET:
-            if before is not None:
-                return None if found is None else math.sqrt(found * within(self._timed, before))
-            if self._seconds < PATIENCE:
-                return None
-        return found
+        before, near = self._plan.unit, near_targets(self._timed) if self._plan.threads > 1 else set()
+        beside = [one for k, one in enumerate(self._timed) if k in near]
+        halves, whole = ([one for k, one in enumerate(self._timed) if k not in near and one.coarse == coarse]
+                         for coarse in (True, False))  # fmt: skip
+        if before is None and beside and len(halves) + len(whole) < LEAST_QUIET and self._seconds < PATIENCE:
+            return None
+        own = [
+            (BESIDE * min(len(beside) / MANY, 1.0), unit_seconds(beside, SLOWED / self._plan.threads)),
+            (COARSE * min(len(halves) / MANY, 1.0), unit_seconds(halves)),
+            (len(whole) / LEAST_QUIET, unit_seconds(whole)),
+        ]
+        known = [(weight, math.log(unit)) for weight, unit in own if unit is not None]
+        if not known:
+            return None
+        if before is not None:
+            known.append((BEFORE, math.log(within(self._timed, before))))
+        return math.exp(sum(weight * unit for weight, unit in known) / sum(weight for weight, _ in known))
 
     def seconds(self, standing: Standing) -> float | None:
         """Seconds from here to the end of the iterations; None = speed or end of a coarse start is unknown."""
@@ -108,11 +126,10 @@ class TimeLeft:
         return self._plan.pixels / 4 if coarse else self._plan.pixels
 
 
-def unit_seconds(timed: Iterable[Timed], slowed: float) -> float | None:
+def unit_seconds(timed: Iterable[Timed], slowed: float = 0.0) -> float | None:
     """Seconds per unit of work, without the iterations beyond SPIKE medians; None = too few iterations.
 
-    slowed   seconds that one of the second thread costs the iterations, unless these wait for targets meanwhile; for
-             fewer than LEAST_QUIET iterations without it
+    slowed   seconds that one of the second thread costs the iterations, unless these wait for targets meanwhile
 
     Edges:   at least half of the fastest iteration, which shares a core at most; the work of the second thread is known
              by target, not by iteration.
@@ -120,8 +137,6 @@ def unit_seconds(timed: Iterable[Timed], slowed: float) -> float | None:
     known = list(timed)
     if len(known) < LEAST_ITERATIONS:
         return None
-    rest = quiet(known)
-    known = rest if len(rest) >= LEAST_QUIET else known
     each = [one.seconds / one.work for one in known]
     limit = SPIKE * statistics.median(each)
     kept = [one for one, unit in zip(known, each) if unit <= limit]
@@ -138,9 +153,7 @@ def within(timed: Iterable[Timed], before: float) -> float:
     return max(min(before, statistics.median(each)), min(each) / 2)
 
 
-def quiet(timed: Iterable[Timed]) -> list[Timed]:
-    """The iterations during which the second thread rests: no target is finished in them, just before or soon after."""
-    known = list(timed)
-    made = [k for k, one in enumerate(known) if one.beside or one.waited]
-    near = {k for at in made for k in range(at - QUIET_BEFORE, at + QUIET_AFTER + 1)}
-    return [one for k, one in enumerate(known) if k not in near]
+def near_targets(timed: Iterable[Timed]) -> set[int]:
+    """The positions of iterations beside the second thread: a target is finished in them, just before or soon after."""
+    made = [k for k, one in enumerate(timed) if one.beside or one.waited]
+    return {k for at in made for k in range(at - QUIET_BEFORE, at + QUIET_AFTER + 1)}
