@@ -173,7 +173,7 @@ def test_model_baselines_and_cross_fade_share_the_maps_of_a_frame(monkeypatch):
     weights = LpipsWeights((), (), (np.ones(3, np.float32),), np.zeros(3), np.ones(3))
     monkeypatch.setattr(evaluate, "feature_maps", lambda image, *_: asked.append(0) or [image])
     found = evaluate.evaluate_model(
-        sequence, lambda i: unit_image(sequence, i), weights, cross_fade=lambda i: two_neighbours(sequence, i)
+        sequence, lambda i: unit_image(sequence, i), weights, own={"cross_fade": lambda i: two_neighbours(sequence, i)}
     )
     different = {unit_image(sequence, 1).tobytes()}
     different |= {np.asarray(make(sequence)(1)).tobytes() for _, make in evaluate.EVERY_BASELINE.values()}

@@ -99,6 +99,10 @@ def test_a_check_changes_nothing_and_a_better_fit_has_less_error(sequence):
     assert expected_end(100, 0.5, start._replace(lacking=0.0)) == latest
     assert all(np.array_equal(a, before[name]) for name, a in arrays(state.gaussians).items())
     assert state.rng.bit_generator.state == generator
+    state.coarse_until = told = latest - 40
+    assert not coarse_ends(state, start)
+    alone = min(int(CHECK_EVERY * (poor / start.lacking) ** 2), latest)
+    assert state.coarse_until == (told + alone) // 2 != alone, "the mean with the checks before"
     state.iteration = 0
     trained, *_ = run(sequence, settings(iterations=60))
     assert coarse_start.fit_error(trained, constants, frames) < 0.95 * poor

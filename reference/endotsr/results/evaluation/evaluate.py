@@ -41,7 +41,10 @@ FORMAT = 1  # of metrics.json; raised when a key changes its name or meaning
 LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "minus_one_one"}  # protocol value first
 EVERY_BASELINE = {**BASELINES, **TISSUE_BASELINES}
 MODEL = ""  # key of the model among the methods
-CROSS_FADE = "Blend of this model's own renders at the two neighbouring training times"
+OWN = {  # key in metrics.json -> label of a prediction that is made of the renders of the model
+    "recorded_detail": "This model with the recorded detail of the two neighbouring training frames",
+    "cross_fade": "Blend of this model's own renders at the two neighbouring training times",
+}
 FEWEST_AT_A_TIME, BYTES_AT_A_TIME = 2, 3e8  # renders measured at a time, one per thread within this memory
 PERCEIVED_BYTES = 140  # of LPIPS per pixel of a render: 44 MB at 640x512, 280 MB at 1920x1080
 EVERY_TRAINING_FRAME = 6  # every sixth training frame is evaluated too
@@ -138,22 +141,20 @@ def evaluate_model(
     render_frame: RenderFrame,
     lpips_weights: LpipsWeights | None = None,
     training: Iterable[int] | None = None,
-    cross_fade: RenderFrame | None = None,
+    own: Mapping[str, RenderFrame] | None = None,
 ) -> EvaluationRecord:
     """The content of metrics.json for the renders of a sequence.
 
     training   training frames to evaluate too, without LPIPS; default: `training_sample`
-    cross_fade blend of the model's renders at the two neighbouring training times
+    own        key of `OWN` -> predictions that are made of the model's renders
     returns    {"format", "frames", "held_out", "training", "temporal_gap", "baselines", "lpips_reason",
-               "not_finite"}, and "cross_fade" if it is given; `temporal_gap` is the training mean minus the held-out
-               mean of each metric; `lpips_reason` is None if LPIPS was computed; `not_finite` does not count the
-               cross-fade
+               "not_finite"}, and the keys of `own`; `temporal_gap` is the training mean minus the held-out mean of each
+               metric; `lpips_reason` is None if LPIPS was computed; `not_finite` does not count `own`
     """
     chosen = training_sample(sequence) if training is None else [int(i) for i in training]
     seen = times_seen(sequence)
     methods = {MODEL: render_frame} | {name: make(sequence) for name, (_, make) in EVERY_BASELINE.items()}
-    if cross_fade is not None:
-        methods[CROSS_FADE] = cross_fade
+    methods |= own or {}
     held_out = evaluate_methods(sequence, sequence.test_index, methods, lpips_weights, seen)
     inside = evaluate_frames(sequence, chosen, render_frame)
     frames: FramesPart = {
@@ -170,9 +171,7 @@ def evaluate_model(
         name: {"label": label, **held_out[name]} for name, (label, _) in EVERY_BASELINE.items()
     }
     record = evaluation_record(frames, held_out[MODEL], inside, baselines, obstacle)
-    if cross_fade is not None:
-        record["cross_fade"] = {"label": CROSS_FADE, **held_out[CROSS_FADE]}
-    return record
+    return cast(EvaluationRecord, record | {key: {"label": OWN[key], **held_out[key]} for key in own or {}})
 
 
 def evaluation_record(

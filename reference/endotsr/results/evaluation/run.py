@@ -19,6 +19,7 @@ from endotsr.results.evaluation.baselines import neighbours
 from endotsr.results.evaluation.evaluate import evaluate_frames, evaluate_model
 from endotsr.results.evaluation.lpips import LpipsWeights
 from endotsr.results.evaluation.measures import measured
+from endotsr.results.evaluation.recorded_detail import with_recorded_detail
 from endotsr.results.evaluation.records import (
     EvaluationRecord,
     LabelledMeans,
@@ -39,6 +40,7 @@ COMPONENTS = {"appearance": "A, colour residual", "spectral_motion": "S, transla
 KEPT = ("seed", "threads", "started", "finished", "seconds", "peak_memory_bytes", "lambda_lap", "versions", "machine")
 
 RENDERS_KEPT = 32  # cached held-out renders; further frames are rendered again
+NEIGHBOURS_KEPT = 4  # cached renders of training frames beside a held-out one, and of this one
 POINTS = 8  # along each side of the picture: grid for the image motion of a camera
 
 RenderFrame = Callable[[int], RenderOut]  # frame number -> render
@@ -78,8 +80,9 @@ def measure_model(
 
     weights         None: LPIPS is None
     true_positions  of a simulated sequence, to measure the motion
-    returns         the keys of `evaluate_model`; `cross_fade`: metrics of the blend of the model's renders at the
-                    neighbouring training times; `trajectories`: `TrajectoryError` and its `unit`, or None;
+    returns         the keys of `evaluate_model`, among them those of `OWN`: metrics of the renders with recorded
+                    detail, and of the blend of the renders at the neighbouring training times; `trajectories`:
+                    `TrajectoryError` and its `unit`, or None;
                     `pose_correction`: see `pose_change`; `components`: means with one residual removed
     """
     given, sequence = sequence, with_corrected_cameras(sequence, model.frames)
@@ -93,7 +96,12 @@ def measure_model(
         return (held_out if index in sequence.test_index else render)(index).colour
 
     held_out: RenderFrame = lru_cache(RENDERS_KEPT)(render)
-    metrics = evaluate_model(sequence, colour, weights, cross_fade=_cross_fade(sequence, colour))
+    near = lru_cache(NEIGHBOURS_KEPT)(colour)
+    own = {
+        "recorded_detail": lambda index: with_recorded_detail(sequence, index, near),
+        "cross_fade": _cross_fade(sequence, near),
+    }
+    metrics = evaluate_model(sequence, colour, weights, own=own)
     motion = None if true_positions is None else trajectory_error(model, sequence, true_positions)
     metrics["trajectories"] = None if motion is None else cast(MotionPart, motion._asdict() | {"unit": sequence.unit})
     metrics["pose_correction"] = pose_change(given, sequence)

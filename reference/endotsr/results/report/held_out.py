@@ -7,7 +7,7 @@ compares the tissue PSNR with and without pixels that training hardly shows, ano
 from collections.abc import Mapping
 from typing import Any
 
-from endotsr.results.evaluation.evaluate import held_out_means, left_out
+from endotsr.results.evaluation.evaluate import OWN, held_out_means, left_out
 from endotsr.results.evaluation.records import FramesMeasured, Means
 from endotsr.results.report import parts
 from endotsr.results.report.data import COLUMNS, DECIDING, SEEN, ReportData
@@ -20,7 +20,7 @@ MetricsRow = tuple[str, Mapping[str, Any], str]  # label, means by metric, and t
 
 
 def mean_of(data: ReportData, key: str, extrapolated: bool = False) -> Means:
-    """Means of `held_out`, `training` or `cross_fade`; of held-out frames, see `held_out_means`; {} without them."""
+    """Means of `held_out`, `training` or a key of `OWN`; of held-out frames, see `held_out_means`; {} without them."""
     measured = data.evaluation.get(key)
     return held_out_means(data.evaluation, measured)[extrapolated] if measured else {}
 
@@ -59,8 +59,9 @@ def _rows(data: ReportData, extrapolated: bool = False) -> list[MetricsRow]:
     rows: list[MetricsRow] = []
     if mean := mean_of(data, "held_out", extrapolated):
         rows.append(("This model", mean, "model"))
-    if faded := data.evaluation.get("cross_fade"):
-        rows.append((faded["label"], mean_of(data, "cross_fade", extrapolated), ""))
+    for key in OWN:
+        if found := data.evaluation.get(key):
+            rows.append((found["label"], mean_of(data, key, extrapolated), ""))
     return rows + [(label, mean, "") for label, mean in baseline_rows(data, extrapolated)]
 
 

@@ -3,7 +3,7 @@
 In: the dictionary of metrics.json. Out: plain text.
 """
 
-from endotsr.results.evaluation.evaluate import all_extrapolated, held_out_means, left_out
+from endotsr.results.evaluation.evaluate import OWN, all_extrapolated, held_out_means, left_out
 from endotsr.results.evaluation.records import EvaluationRecord, FramesMeasured, Means, MotionPart, PosePart, RunPart
 from endotsr.results.report.tables import duration, fixed, plain
 from endotsr.untrusted.names import counted
@@ -51,7 +51,7 @@ def held_out_table(metrics: EvaluationRecord) -> str:
     metrics   of a run, or from `evaluation.pictures.measure_pictures` (with `label`)
     """
     measured: list[tuple[str, FramesMeasured]] = [(metrics.get("label", "this model"), metrics["held_out"])]
-    measured += [(entry["label"], entry) for entry in [metrics.get("cross_fade")] if entry]
+    measured += [(entry["label"], entry) for key in OWN if (entry := metrics.get(key))]
     measured += [(entry["label"], entry) for entry in metrics["baselines"].values()]
     means = [(label, *held_out_means(metrics, entry)) for label, entry in measured]
     total, outside = len(metrics["held_out"]["per_frame"]), (metrics.get("frames") or {}).get("extrapolated") or []
@@ -94,7 +94,8 @@ def interpolation_sentence(metrics: EvaluationRecord) -> str:
     Edges   "" if the model is level or above in PSNR of the tissue, if one of the two has no finite value, or if no
             held-out frame is between training frames. Where the model has the lower LPIPS, the sentence is
             restricted to PSNR. A second sentence follows if the model is below the blend on its own training frames
-            too: a longer training may then change the order.
+            too: a longer training may then change the order. If the recorded detail raises the model above the blend,
+            the sentence says so instead.
     """
     blend = metrics["baselines"].get("two_neighbours")
     if blend is None or all_extrapolated(metrics):
@@ -108,6 +109,14 @@ def interpolation_sentence(metrics: EvaluationRecord) -> str:
     if perceived[0] is not None and perceived[1] is not None:
         values += f" (LPIPS {perceived[1]:.4f} and {perceived[0]:.4f})"
         scope = "in PSNR, " if perceived[0] < perceived[1] else ""
+    detailed = held_out_means(metrics, entry)[0] if (entry := metrics.get("recorded_detail")) else {}
+    raised, lpips = detailed.get("psnr_tissue"), detailed.get("lpips")
+    if raised is not None and raised > best:
+        perceived_too = "" if lpips is None else f" (LPIPS {lpips:.4f})"
+        return (
+            f"Between its training frames this model is below a blend: that of the two neighbouring frames reaches"
+            f" {values}. With the recorded detail of these frames it reaches {raised:.2f} dB{perceived_too}."
+        )
     sentence = f"{scope}interpolation suffices on this clip for the frames between: the blend of the two neighbouring"
     sentence = f"{sentence[0].upper()}{sentence[1:]} training frames reaches {values}."
     fitted = metrics["training"]["mean"].get("psnr_tissue")

@@ -36,7 +36,7 @@ BOTH_WAYS = 0.55  # factor of the initial motion with several threads, which tak
 FLOWS, TARGET = 0.5, 0.8  # units per gap for its two flows, and per time for its target
 MEASURED, PERCEIVED = 1.15, 2.2  # units per picture for its metrics, and for LPIPS
 TOGETHER = 0.7  # factor of both with several threads, which measure two pictures at a time
-METHODS = 8  # pictures per held-out frame: the render, the cross-fade and six baselines
+METHODS = 9  # pictures per held-out frame: the render, two that are made of renders, and six baselines
 # Units per Gaussian for the viewer, the report and the renders. From `quick` to `sharp` on two threads, the evaluation
 # grew by 0.0011 on pulling and by 0.0026 on cutting, which has more held-out frames to render.
 PAGES = 0.0015
