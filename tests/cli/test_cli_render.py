@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from tiny import assert_refused, render
 
+import endotsr
 from endotsr.cli.main import main
 from endotsr.clips.opencv.png import read_png
+from endotsr.results.evaluation.baselines import unit_image
+from endotsr.results.evaluation.recorded_texture import with_recorded_texture
 from endotsr.results.report.figures import bytes_image
 from endotsr.results.views import pictures
 from film_reader import read_video
@@ -164,3 +167,33 @@ def test_a_picture_that_is_written_is_not_kept_in_memory(finished_run, tmp_path,
     monkeypatch.setattr(pictures, "bytes_image", watched)
     render(finished_run, tmp_path / "a", "--frames", "all")
     assert len(written) == 9 and 1 <= len(alive) <= 3
+
+
+def test_texture_shows_the_training_frame_at_its_time_and_the_evaluated_picture_between(finished_run, tmp_path):
+    run = endotsr.open_run(finished_run)
+    sequence = run.sequence
+    for frames, name in (("train", "a"), ("test", "b")):
+        render(finished_run, tmp_path / name, "--frames", frames, "--npy", "--texture")
+    shown = np.load(next(iter(sorted((tmp_path / "a" / "colour").glob("*.npy")))))
+    first = int(sequence.train_index[0])
+    error = np.abs(shown - unit_image(sequence, first))[:, sequence.masks[first]]
+    assert np.median(error) < 1e-4 and error.mean() < 0.01, "bicubic interpolation at an edge of the mask"
+    index = int(sequence.test_index[0])
+    between = np.load(next(iter(sorted((tmp_path / "b" / "colour").glob("*.npy")))))
+    expected = with_recorded_texture(sequence, index, lambda k: run.render(float(sequence.times[k]), k).colour)
+    assert np.abs(between - expected).max() < 1e-6
+    metrics = json.loads((finished_run / "metrics.json").read_text())
+    assert metrics["recorded_texture"]["mean"]["psnr_tissue"] > metrics["held_out"]["mean"]["psnr_tissue"]
+
+
+@pytest.mark.parametrize("words", [("--camera", "orbit"), ("--offset", "1", "0", "0"), ("--size", "96x64")])
+def test_texture_is_of_the_cameras_of_the_recording(words, finished_run, tmp_path, capsys):
+    said = ("--texture", "the views of the recording alone", "--camera observed")
+    assert_refused(capsys, ["render", str(finished_run), "--out", str(tmp_path / "a"), "--texture", *words], *said)
+
+
+def test_texture_needs_the_frames_of_a_run(finished_run, tmp_path, capsys):
+    assert main(["export", str(finished_run), "--out", str(tmp_path / "slim.npz")]) == 0
+    words = ["render", str(tmp_path / "slim.npz"), "--out", str(tmp_path / "a"), "--texture"]
+    capsys.readouterr()
+    assert_refused(capsys, words, "--texture needs the frames of one training")

@@ -191,7 +191,7 @@ def test_no_pair_of_options_of_render_is_silent(finished_run, tmp_path):
     values = {
         "times": ["0.1", "0.5"], "frames": ["train"], "count": ["3"], "camera": ["orbit"], "angle": ["30"],
         "offset": ["1", "0", "0"], "size": ["40x40"], "depth": ["normalised"], "panels": ["render", "depth"],
-        "rate": ["5"], "slow": ["2"], "npy": [], "without": ["appearance"], "sequence": ["elsewhere"],
+        "rate": ["5"], "slow": ["2"], "npy": [], "texture": [], "without": ["appearance"], "sequence": ["elsewhere"],
     }  # fmt: skip
     options = {name: [f"--{name}", *words] for name, words in values.items()}
     assert _names(RenderOptions) - set(options) == {"out", "film", "json", "threads", "replace"}

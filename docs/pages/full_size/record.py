@@ -86,12 +86,16 @@ def rows(records: dict[str, dict], without: tuple[int, ...] = ()) -> list[tuple[
     first = next(iter(records.values()))
     presets: dict[str, list[dict]] = {}
     faded: dict[str, list[dict]] = {}
+    textured: dict[str, list[dict]] = {}
     for metrics in records.values():
         preset = metrics["run"]["settings"]["preset"]
         presets.setdefault(preset, []).append(means(metrics["held_out"], without))
+        if row := metrics.get("recorded_texture"):
+            textured.setdefault(preset, []).append(means(row, without))
         if row := metrics.get("cross_fade"):
             faded.setdefault(preset, []).append(means(row, without))
     out = [(f"endotsr, preset `{name}`{counted(runs)}", runs) for name, runs in presets.items()]
+    out += [(f"`{name}` with recorded texture{counted(of)}", of) for name, of in textured.items()]
     out += [(f"blend of the own renders of `{name}`{counted(of)}", of) for name, of in faded.items()]
     out += [(baseline["label"], [means(baseline, without)]) for baseline in first["baselines"].values()]
     held_out = [row["frame"] for row in first["held_out"]["per_frame"]]

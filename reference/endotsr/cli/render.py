@@ -54,10 +54,12 @@ class RenderOptions:
     """slow-down of a film by a factor of N relative to the recording, instead of --rate"""
     npy: bool = False
     """also write float arrays: colour (3, H, W), depth and opacity (H, W)"""
+    texture: bool = False
+    """add what the training frames around each time record and the scene lacks, as seen by the cameras of the frames"""
     without: tuple[Literal["appearance", "spectral_motion"], ...] = ()
     """components to omit"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
-    """current location of the sequence of the run, for truth and error (default: the recorded one)"""
+    """current location of the sequence of the run, for truth, error and --texture (default: the recorded one)"""
     replace: bool = False
     """replace an existing film that endotsr did not write"""
     json: JsonFile = None
@@ -73,6 +75,7 @@ def run(words: list[str]) -> int:
     from endotsr.results.views import pictures
     from endotsr.results.views.film import speed_in_words, write_film
     from endotsr.results.views.plan import ViewRequest
+    from endotsr.results.views.texture import check_texture, with_texture
     from endotsr.studies.windows.scene import shown_frames
 
     options = parse(RenderOptions, words, "render")
@@ -81,12 +84,16 @@ def run(words: list[str]) -> int:
     pictures.check_outputs(options.out, options.film, options.rate, options.slow, options.replace)
     use_threads(options.threads)
     scene = _opened(options)
+    if options.texture:
+        check_texture(scene, request)
     views = pictures.requested_views(scene, request, "test" if options.out else "all")
     shown_at, duration = [view.time for view in views], scene.record.duration
     rate = _rate(options, shown_at, duration)
     look = pictures.Look(options.depth, options.without, options.panels)
     sequence = shown_frames(scene, options.panels, views, options.sequence) if options.film else None
     made = pictures.rendered(scene, views, look)
+    if options.texture:
+        made = with_texture(scene, made, options.sequence, options.without)
 
     def film(shown) -> None:
         if options.film and rate:

@@ -151,7 +151,7 @@ RENDER = (
     Needs(("npy",), ("out",), "arrays are written to the folder of the pictures"),
     Needs(("depth",), ("out", "panels=depth"), "neither pictures of depth nor a panel of depth is written"),
     Needs(("angle",), ("camera=orbit", "camera=sway"), "the other cameras do not turn"),
-    Needs(("sequence",), ("panels=truth", "panels=error"), "only these panels show the frames of the sequence"),
+    Needs(("sequence",), ("panels=truth", "panels=error", "texture"), "nothing else reads the frames of the sequence"),
 )
 # format: of --out, by its ending
 EXPORT = (

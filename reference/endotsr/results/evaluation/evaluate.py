@@ -42,7 +42,7 @@ LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "mi
 EVERY_BASELINE = {**BASELINES, **TISSUE_BASELINES}
 MODEL = ""  # key of the model among the methods
 OWN = {  # key in metrics.json -> label of a prediction that is made of the renders of the model
-    "recorded_detail": "This model with the recorded detail of the two neighbouring training frames",
+    "recorded_texture": "This model with the recorded texture of the two neighbouring training frames",
     "cross_fade": "Blend of this model's own renders at the two neighbouring training times",
 }
 FEWEST_AT_A_TIME, BYTES_AT_A_TIME = 2, 3e8  # renders measured at a time, one per thread within this memory

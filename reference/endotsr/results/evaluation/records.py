@@ -145,7 +145,7 @@ class EvaluationRecord(TypedDict):
     baselines: dict[str, LabelledFrames]
     lpips_reason: str | None  # None if LPIPS was computed
     not_finite: int
-    recorded_detail: NotRequired[LabelledFrames]
+    recorded_texture: NotRequired[LabelledFrames]
     cross_fade: NotRequired[LabelledFrames]
     trajectories: NotRequired[MotionPart | None]
     pose_correction: NotRequired[PosePart | None]

@@ -19,7 +19,7 @@ from endotsr.results.evaluation.baselines import neighbours
 from endotsr.results.evaluation.evaluate import evaluate_frames, evaluate_model
 from endotsr.results.evaluation.lpips import LpipsWeights
 from endotsr.results.evaluation.measures import measured
-from endotsr.results.evaluation.recorded_detail import with_recorded_detail
+from endotsr.results.evaluation.recorded_texture import with_recorded_texture
 from endotsr.results.evaluation.records import (
     EvaluationRecord,
     LabelledMeans,
@@ -81,7 +81,7 @@ def measure_model(
     weights         None: LPIPS is None
     true_positions  of a simulated sequence, to measure the motion
     returns         the keys of `evaluate_model`, among them those of `OWN`: metrics of the renders with recorded
-                    detail, and of the blend of the renders at the neighbouring training times; `trajectories`:
+                    texture, and of the blend of the renders at the neighbouring training times; `trajectories`:
                     `TrajectoryError` and its `unit`, or None;
                     `pose_correction`: see `pose_change`; `components`: means with one residual removed
     """
@@ -98,7 +98,7 @@ def measure_model(
     held_out: RenderFrame = lru_cache(RENDERS_KEPT)(render)
     near = lru_cache(NEIGHBOURS_KEPT)(colour)
     own = {
-        "recorded_detail": lambda index: with_recorded_detail(sequence, index, near),
+        "recorded_texture": lambda index: with_recorded_texture(sequence, index, near),
         "cross_fade": _cross_fade(sequence, near),
     }
     metrics = evaluate_model(sequence, colour, weights, own=own)

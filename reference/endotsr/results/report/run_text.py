@@ -94,7 +94,7 @@ def interpolation_sentence(metrics: EvaluationRecord) -> str:
     Edges   "" if the model is level or above in PSNR of the tissue, if one of the two has no finite value, or if no
             held-out frame is between training frames. Where the model has the lower LPIPS, the sentence is
             restricted to PSNR. A second sentence follows if the model is below the blend on its own training frames
-            too: a longer training may then change the order. If the recorded detail raises the model above the blend,
+            too: a longer training may then change the order. If the recorded texture raises the model above the blend,
             the sentence says so instead.
     """
     blend = metrics["baselines"].get("two_neighbours")
@@ -109,13 +109,13 @@ def interpolation_sentence(metrics: EvaluationRecord) -> str:
     if perceived[0] is not None and perceived[1] is not None:
         values += f" (LPIPS {perceived[1]:.4f} and {perceived[0]:.4f})"
         scope = "in PSNR, " if perceived[0] < perceived[1] else ""
-    detailed = held_out_means(metrics, entry)[0] if (entry := metrics.get("recorded_detail")) else {}
-    raised, lpips = detailed.get("psnr_tissue"), detailed.get("lpips")
+    textured = held_out_means(metrics, entry)[0] if (entry := metrics.get("recorded_texture")) else {}
+    raised, lpips = textured.get("psnr_tissue"), textured.get("lpips")
     if raised is not None and raised > best:
         perceived_too = "" if lpips is None else f" (LPIPS {lpips:.4f})"
         return (
             f"Between its training frames this model is below a blend: that of the two neighbouring frames reaches"
-            f" {values}. With the recorded detail of these frames it reaches {raised:.2f} dB{perceived_too}."
+            f" {values}. With the recorded texture of these frames it reaches {raised:.2f} dB{perceived_too}."
         )
     sentence = f"{scope}interpolation suffices on this clip for the frames between: the blend of the two neighbouring"
     sentence = f"{sentence[0].upper()}{sentence[1:]} training frames reaches {values}."
