@@ -55,7 +55,7 @@ MAKERS = {
     "golden/cases/": (CONSTANTS,),
     "golden/makers/": (OPERATIONS,),
     f"{PACKAGE}port/judge/profiles.py": (OPERATIONS,),
-    f"{PACKAGE}port/stages/": (OPERATIONS,),
+    f"{PACKAGE}port/operations/": (OPERATIONS,),
 }
 # Recordings as users have them, which the commands read through several rooms.
 INPUTS = ("tests/clips/sequences/inputs", "tests/clips/sequences/layouts")
@@ -64,7 +64,7 @@ MORE = {
     f"{PACKAGE}definition/": ("tests/definition", "tests/test_specification.py", "tests/docs/test_live.py"),
     f"{PACKAGE}method/": ("tests/test_gradcheck.py", "tests/definition/test_twins.py"),
     f"{PACKAGE}method/losses/": tuple(f"tests/training/fitting/test_{name}.py" for name in ("objective", "zero_cost")),
-    f"{PACKAGE}port/stages/": (
+    f"{PACKAGE}port/operations/": (
         "tests/test_gradcheck.py",
         "tests/definition/test_twins.py",
         "tests/docs/test_equation_map.py",

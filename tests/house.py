@@ -24,7 +24,7 @@ STOREYS: dict[str, tuple[str, ...]] = {
     "clips": ("opencv", "poses", "formats", "sequences", "flow", "masks", "prepare", "simulator", "effects"),
     "training": ("scene", "fitting", "runs"),
     "results": ("evaluation", "report", "export", "views"),
-    "port": ("stages", "gradcheck", "judge", "contract", "reference", "search"),
+    "port": ("operations", "gradcheck", "judge", "contract", "reference", "search"),
     "studies": ("bench", "tradeoff", "sweeps", "windows"),
     "api": (),
     "cli": (),

@@ -100,10 +100,10 @@ def private_names(file: Path) -> set[str]:
     return {name.removeprefix("endotsr.") for name in found if not name.endswith("__")}
 
 
-STAGES = [(file, name) for file in SOURCES for name in public_functions(file) if name.endswith("_forward")]
+OPERATIONS = [(file, name) for file in SOURCES for name in public_functions(file) if name.endswith("_forward")]
 
 
-@pytest.mark.parametrize("file, name", STAGES, ids=[name for _, name in STAGES])
+@pytest.mark.parametrize("file, name", OPERATIONS, ids=[name for _, name in OPERATIONS])
 def test_every_forward_has_a_reverse_directly_below_it(file, name):
     functions = public_functions(file)
     reverse = name.removesuffix("_forward") + "_reverse"
@@ -111,11 +111,11 @@ def test_every_forward_has_a_reverse_directly_below_it(file, name):
     assert functions[reverse] > functions[name], f"{reverse} stands above {name}"
 
 
-@pytest.mark.parametrize("file, name", STAGES, ids=[name for _, name in STAGES])
+@pytest.mark.parametrize("file, name", OPERATIONS, ids=[name for _, name in OPERATIONS])
 def test_every_forward_is_named_by_a_pair(file, name):
     dotted = f"{module_name(file)}.{name}"
     functions = {pair.function for pair in (*all_pairs().values(), *definition_pairs().values())}
-    assert ALIASES.get(dotted, dotted) in functions, f"{dotted} is not checked: register a stage that names it"
+    assert ALIASES.get(dotted, dotted) in functions, f"{dotted} is not checked: register an operation that names it"
 
 
 def test_every_pair_names_a_function_of_the_package():

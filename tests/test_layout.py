@@ -64,7 +64,7 @@ def test_the_definition_knows_numpy_alone():
             assert {part.split(".")[0] for node in nodes for part in house.names_of(node)} <= known | more, name
     assert {house.room(b) for a, b in house.imports() if house.room(a) == "definition"} == {"definition"}
     users = {house.room(a) for a, b in house.imports() if house.room(b) == "definition"}
-    assert users == {"definition", "port.stages"}, "nothing that is fitted computes with the definition"
+    assert users == {"definition", "port.operations"}, "nothing that is fitted computes with the definition"
 
 
 def test_functions_of_the_definition_are_short():

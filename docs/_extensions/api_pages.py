@@ -31,7 +31,7 @@ GROUPS = (
     (
         "Ports",
         "Gradients, stored numbers, and the registry of both.",
-        ("stages", "gradcheck", "judge", "contract", "reference", "search"),
+        ("operations", "gradcheck", "judge", "contract", "reference", "search"),
     ),
     ("Studies", "Measurements of this machine, and many runs.", ("bench", "tradeoff", "sweeps", "windows")),
     ("Commands", "The program `endotsr`.", ("cli",)),

@@ -1,7 +1,7 @@
 """The map of the book: for each equation its functions, reverse pass, gradient check, golden cases and notebooks.
 
-Everything is read from the registry of stages, `golden/cases` and the notebooks. Only information without a stage is
-here: the functions of equations without a derivative, the reason, and the tests that check them instead.
+Everything is read from the registry of operations, `golden/cases` and the notebooks. Only information without an
+operation is here: the functions of equations without a derivative, the reason, and the tests that check them instead.
 """
 
 import json

@@ -14,7 +14,7 @@ from sphinx.errors import ExtensionError
 
 from endotsr.port.gradcheck import PairReport, all_pairs, check_pair, one_thread, pair_stream
 from endotsr.port.judge.store import read_golden
-from endotsr.port.stages.registry import all_stages
+from endotsr.port.operations.registry import method_operations
 from makers.twins import BOUND, BOUNDS, Distance, all_distances, golden_requests
 
 DOCS = ROOT / "docs"
@@ -49,11 +49,11 @@ def check_links(row: Equation) -> str:
 
 
 def without_repetition(names: list[str]) -> list[str]:
-    """The first name in full, then only the differing parts if all start with the same stage."""
+    """The first name in full, then only the differing parts if all start with the same operation."""
     first = names[0]
-    stages = [pair.function.rpartition(".")[2].removesuffix("_forward") for pair in all_pairs().values()]
-    stage = next((s for s in stages if all(name.startswith(f"{s}_") for name in names)), None)
-    return [first, *(name.removeprefix(f"{stage}_") for name in names[1:])] if stage else names
+    operations = [pair.function.rpartition(".")[2].removesuffix("_forward") for pair in all_pairs().values()]
+    operation = next((s for s in operations if all(name.startswith(f"{s}_") for name in names)), None)
+    return [first, *(name.removeprefix(f"{operation}_") for name in names[1:])] if operation else names
 
 
 def golden_links(row: Equation) -> str:
@@ -87,7 +87,7 @@ def equation_page() -> str:
         "# Map of the equations",
         "",
         "For each equation the table links the function, the reverse pass, the gradient check, the golden cases and",
-        "the notebook. It is made from the registry of stages; the number of cases is in brackets.",
+        "the notebook. It is made from the registry of operations; the number of cases is in brackets.",
         "",
         "| Equation | Function | Reverse | Check | Golden cases | Notebook |",
         "|---|---|---|---|---|---|",
@@ -141,7 +141,7 @@ def _report(name: str, function: str, report: PairReport) -> Iterator[str]:
 def definition_page(found: list[Distance]) -> str:
     """The worst difference of every output from the definition. A difference above its bound stops the build."""
     if wrong := [
-        f"{d.stage}.{d.output}: {d.distance:.1e} of {d.bound:.0e}" for d in found if not d.distance <= d.bound
+        f"{d.operation}.{d.output}: {d.distance:.1e} of {d.bound:.0e}" for d in found if not d.distance <= d.bound
     ]:
         raise ExtensionError("compiled functions differ from their definition\n" + "\n".join(wrong))
     lines = [
@@ -161,13 +161,13 @@ def definition_page(found: list[Distance]) -> str:
         "",
         *(f"- {name}: {reason} ({bound:g})." for name, (bound, reason) in BOUNDS.items()),
         "",
-        "| Stage | Equation | Definition | Output | Largest difference | Bound |",
+        "| Operation | Equation | Definition | Output | Largest difference | Bound |",
         "|---|---|---|---|---|---|",
     ]
-    labels = {name: stage.equation.lower() for name, stage in all_stages().items()}
+    labels = {name: operation.equation.lower() for name, operation in method_operations().items()}
     for d in found:
-        equation = f"{{eq}}`eq-{labels[d.stage.split()[0]]}`"
-        cells = (d.stage, equation, function_link(d.function), f"`{d.output}`", f"{d.distance:.1e}", f"{d.bound:g}")
+        equation = f"{{eq}}`eq-{labels[d.operation.split()[0]]}`"
+        cells = (d.operation, equation, function_link(d.function), f"`{d.output}`", f"{d.distance:.1e}", f"{d.bound:g}")
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -249,4 +249,4 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 if __name__ == "__main__":
     for d in differences():
-        print(f"{d.stage:24} {d.output:30} {d.distance:8.1e} of {d.bound:.0e}  {d.request}")
+        print(f"{d.operation:24} {d.output:30} {d.distance:8.1e} of {d.bound:.0e}  {d.request}")

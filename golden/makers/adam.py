@@ -5,10 +5,10 @@ tiny gradients, and a second moment of 0, which moves nothing.
 """
 
 from makers.making import Made, Seeds, Spec, changed
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "adam": Operation(
+    "adam": Declared(
         {"parameter_after": Judged(1, oracle="adam.adam_scalar"), "first": Judged(1), "second": Judged(1)},
         "one step for each of `gradients`, from zero moments; `first`, `second` = moments at the end, before bias"
         " correction",

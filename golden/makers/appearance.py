@@ -5,10 +5,10 @@ Inputs: coefficients A, normalised atoms and the gradient with respect to the re
 """
 
 from makers.making import Seeds, Spec
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "appearance": Operation(
+    "appearance": Declared(
         {
             "residual": Judged(1, "display / Y00", oracle="appearance.appearance_forward"),
             "d_appearance_coefficients": Judged(2, "loss", "last", "appearance.appearance_reverse"),

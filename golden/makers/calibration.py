@@ -7,10 +7,10 @@ an even number of views, a view without photometric gradient, and no valid view.
 import numpy as np
 
 from makers.making import Seeds, Spec, changed
-from makers.operations import PER_DISPLAY, Judged, Operation
+from makers.operations import PER_DISPLAY, Declared, Judged
 
 DECLARED = {
-    "calibration": Operation(
+    "calibration": Declared(
         {
             "g_rgb": Judged(1, PER_DISPLAY),
             "g_lap": Judged(1, PER_DISPLAY),

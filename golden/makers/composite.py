@@ -8,16 +8,16 @@ the preset legacy, and gradients without division by 1 - alpha.
 import numpy as np
 
 from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER
-from endotsr.port.stages.compositing import IMAGES
+from endotsr.port.operations.compositing import IMAGES
 from makers.making import Seeds, Spec, given
-from makers.operations import PER_DISPLAY, PER_LENGTH, Judged, Operation
+from makers.operations import PER_DISPLAY, PER_LENGTH, Declared, Judged
 from makers.screens import flat_covariance, raster_settings, screen_inputs
 from makers.views import PRESETS, logit_of
 
 UNITS = dict(zip(IMAGES, ("display", "scene unit", "1")))
 FORWARD, REVERSE = "compositing.composite_forward", "compositing.composite_reverse"
 DECLARED = {
-    "composite": Operation(
+    "composite": Declared(
         {
             **{name: Judged(1, unit, oracle=FORWARD) for name, unit in UNITS.items()},
             "d_mean2d": Judged(2, "loss per px", "last", REVERSE),

@@ -24,12 +24,12 @@ from typing import NamedTuple
 import numba
 
 import endotsr
-from endotsr.port.stages.stage import Stage
+from endotsr.port.operations.operation import Operation
 
 PACKAGE = Path(endotsr.__file__).parent
 ROOT = "endotsr"
 SHARED = {ROOT, f"{ROOT}.errors", f"{ROOT}.method.kernels.jit"}  # the same objects in every copy
-REGISTRY, CONTRACT = f"{ROOT}.port.stages.registry", f"{ROOT}.port.contract"
+REGISTRY, CONTRACT = f"{ROOT}.port.operations.registry", f"{ROOT}.port.contract"
 
 
 class Edit(NamedTuple):
@@ -62,7 +62,7 @@ def _holds_kernels(module: str) -> bool:
 
 
 @contextmanager
-def changed_copy(edits: Sequence[Edit]) -> Iterator[Callable[[str], Stage]]:
+def changed_copy(edits: Sequence[Edit]) -> Iterator[Callable[[str], Operation]]:
     """The operations, by name, of a copy of the reference with these edits; valid only inside the context.
 
     Raises: ValueError as `changed_text`.
@@ -91,11 +91,11 @@ def _packages_above(name: str) -> list[str]:
     return [".".join(parts[:k]) for k in range(1, len(parts))]
 
 
-def _operation(name: str) -> Stage:
-    for stage in importlib.import_module(CONTRACT).STAGES:
-        if stage.name == name:
-            return stage
-    return importlib.import_module(REGISTRY).all_stages()[name]
+def _operation(name: str) -> Operation:
+    for operation in importlib.import_module(CONTRACT).OPERATIONS:
+        if operation.name == name:
+            return operation
+    return importlib.import_module(REGISTRY).method_operations()[name]
 
 
 def _exchange(names: set[str], modules: Mapping[str, ModuleType]) -> None:

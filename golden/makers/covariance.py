@@ -6,10 +6,10 @@ clip of a log-scale at +-40.
 """
 
 from makers.making import Made, Seeds, Spec, changed, given
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "covariance": Operation(
+    "covariance": Declared(
         {
             "rotation": Judged(1, "1", "last", "covariance.rotation_of"),
             "scale": Judged(1, "scene unit", "last"),

@@ -7,10 +7,10 @@ sign of a width, which affects only its gradient, and the floor of a squared wid
 import numpy as np
 
 from makers.making import Seeds, Spec, changed, given, scalar
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "deformation": Operation(
+    "deformation": Declared(
         {
             "offsets": Judged(1, "raw parameter", "last", "deformation.deformation_forward"),
             "d_fdm_weight": Judged(2, "loss per raw parameter", "last", "deformation.deformation_reverse"),

@@ -11,13 +11,13 @@ import numpy as np
 
 from endotsr.config import DensityConfig
 from makers.making import Made, Seeds, Spec, changed, given, permutation
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 from makers.settings import written_section
 from makers.views import pose
 
 DENSIFY = "density_control.densify"
 DECLARED = {
-    "density": Operation(
+    "density": Declared(
         {
             "extent": Judged(1, "scene unit", oracle=DENSIFY),
             "mean_gradient": Judged(1, "loss per NDC unit", oracle=DENSIFY),

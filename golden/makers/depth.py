@@ -9,10 +9,10 @@ import numpy as np
 
 from makers.images import HEIGHT, WIDTH, spoiled, tool_mask
 from makers.making import Made, Seeds, Spec, changed, given, scalar
-from makers.operations import PER_LENGTH, Judged, Operation
+from makers.operations import PER_LENGTH, Declared, Judged
 
 DECLARED = {
-    "normalised_depth": Operation(
+    "normalised_depth": Declared(
         {
             "loss": Judged(1, oracle="depth.normalised_depth_forward"),
             "d_rendered_depth": Judged(2, PER_LENGTH, oracle="depth.normalised_depth_forward"),

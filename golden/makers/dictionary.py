@@ -8,15 +8,15 @@ import numpy as np
 
 from makers.clock import omegas, stamps, train_index
 from makers.making import Made, Seeds, Spec, given, scalar
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "frequencies": Operation(
+    "frequencies": Declared(
         {"omega": Judged(1, "cycles per sequence", oracle="fourier_oracle.frequencies")},
         "`count` log-spaced values from `low` to `high`",
         settings={"count": "model.frequencies", "low": "model.frequency_min", "high": "model.frequency_max"},
     ),
-    "dictionary": Operation(
+    "dictionary": Declared(
         {
             "phi": Judged(1, oracle="fourier_oracle.dictionary"),
             "d_t": Judged(2, "loss"),
@@ -24,7 +24,7 @@ DECLARED = {
         },
         "atoms at `t`, derivatives by `t` and `omega`",
     ),
-    "atoms": Operation(
+    "atoms": Declared(
         {
             "mean": Judged(1),
             "rms": Judged(1),

@@ -1,9 +1,9 @@
 """Exposure within the whole method: the objective of a frame with gain and bias, and a training that fits them (B13).
 
-The stage alone has the family `exposure`. Here the exposed colours enter the terms, and the gradient of the render and
-of the exposure comes back through them. Red is above 1 before the exposure and other colours are below 0 after it, so
-a clamp at either place changes the loss; the smoothness term has a gradient outside of tissue. In the trajectory, the
-frames before and after a held-out frame have exposures of their own, and an exposed frame moves on while others are
+The operation alone has the family `exposure`. Here the exposed colours enter the terms, and the gradient of the render
+and of the exposure comes back through them. Red is above 1 before the exposure and other colours are below 0 after it,
+so a clamp at either place changes the loss; the smoothness term has a gradient outside of tissue. In the trajectory,
+the frames before and after a held-out frame have exposures of their own, and an exposed frame moves on while others are
 drawn.
 """
 
@@ -17,7 +17,7 @@ from endotsr.config import (
     TrainingConfig,
 )
 from endotsr.method.splatting.settings import PAPER
-from endotsr.port.stages.requests import raster_dict
+from endotsr.port.operations.requests import raster_dict
 from makers.making import Seeds, Spec, changed
 from makers.moving import BASES, LENS, TIME, model_settings, moving_inputs
 from makers.objective import WEIGHTS, image_inputs

@@ -5,10 +5,10 @@ sides of 1. One case has exposed colours below 0 and the other above 1, which re
 """
 
 from makers.making import Seeds, Spec
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "exposure": Operation(
+    "exposure": Declared(
         {
             "exposed": Judged(1, "display", oracle="exposure.exposure_forward"),
             "d_colour": Judged(2, "loss per display", oracle="exposure.exposure_reverse"),

@@ -6,10 +6,10 @@ Gaussian at the optical centre, which has no direction.
 """
 
 from makers.making import Seeds, Spec, changed
-from makers.operations import PER_LENGTH, Judged, Operation
+from makers.operations import PER_LENGTH, Declared, Judged
 
 DECLARED = {
-    "harmonics": Operation(
+    "harmonics": Declared(
         {
             "colour": Judged(1, "display", oracle="harmonics.harmonics_forward"),
             "d_harmonics": Judged(2, "loss"),

@@ -8,12 +8,12 @@ import numpy as np
 
 from endotsr.config import InitialisationConfig, ModelConfig
 from makers.making import Made, Seeds, Spec, changed, given
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 from makers.settings import OF_THE_INITIALISATION, written_section
 from makers.views import pose
 
 DECLARED = {
-    "initialisation": Operation(
+    "initialisation": Declared(
         {
             "count": Judged(1, scale="exact", oracle="initialisation.initialise"),
             "position": Judged(1, "scene unit", "last", "initialisation.initialise"),

@@ -6,13 +6,13 @@ a level without valid pixels, an image without tissue, equal images, and non-fin
 
 import numpy as np
 
-from endotsr.port.stages.laplacian import LEVELS
+from endotsr.port.operations.laplacian import LEVELS
 from makers.images import spoiled, tissue
 from makers.making import Made, Seeds, Spec, given, scalar
-from makers.operations import PER_DISPLAY, Judged, Operation
+from makers.operations import PER_DISPLAY, Declared, Judged
 
 DECLARED = {
-    "laplacian": Operation(
+    "laplacian": Declared(
         {
             **{f"band_{j}": Judged(1, "display", oracle="laplacian.laplacian_levels") for j in range(1, LEVELS + 1)},
             **{f"valid_{j}": Judged(1, scale="exact", oracle="laplacian.support_masks") for j in range(1, LEVELS + 1)},

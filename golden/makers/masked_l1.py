@@ -6,10 +6,10 @@ equal images, and non-finite numbers under the mask: excluded values must have n
 
 from makers.images import masked_mean
 from makers.making import Spec
-from makers.operations import PER_DISPLAY, Judged, Operation
+from makers.operations import PER_DISPLAY, Declared, Judged
 
 DECLARED = {
-    "masked_l1": Operation(
+    "masked_l1": Declared(
         {
             "loss": Judged(1, "display", oracle="masked_l1.masked_l1_forward"),
             "d_rendered": Judged(2, PER_DISPLAY),

@@ -6,11 +6,11 @@ window, its border, and images that are not set to 0 outside tissue before filte
 
 from makers.images import masked_mean
 from makers.making import Spec
-from makers.operations import PER_DISPLAY, Judged, Operation
+from makers.operations import PER_DISPLAY, Declared, Judged
 
 TEXTBOOK = 2e-4  # E[x^2] - E[x]^2 in float32 over C2 = 9e-4: the usual form of SSIM loses this much
 DECLARED = {
-    "masked_ssim": Operation(
+    "masked_ssim": Declared(
         {
             "ssim": Judged(1, oracle="masked_ssim.masked_ssim_forward", least32=TEXTBOOK),
             "d_rendered": Judged(2, PER_DISPLAY, oracle="masked_ssim.masked_ssim_reverse", least32=TEXTBOOK),

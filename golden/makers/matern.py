@@ -7,10 +7,10 @@ order of the weights along the atoms.
 
 from makers.clock import omegas
 from makers.making import Seeds, Spec, scalar
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "matern": Operation(
+    "matern": Declared(
         {
             "rho": Judged(1, oracle="matern_oracle.weights"),
             "penalty": Judged(1, "scene unit^2", oracle="matern.matern_penalty_forward"),

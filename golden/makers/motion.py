@@ -1,14 +1,14 @@
 """Family `motion`: equation (3), the translation C phi.
 
-Inputs: coefficients C, raw atoms and the gradient with respect to the translation. One case suffices: the stage is
+Inputs: coefficients C, raw atoms and the gradient with respect to the translation. One case suffices: the operation is
 linear, and its only possible mistake is to omit sines or cosines.
 """
 
 from makers.making import Seeds, Spec
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "motion": Operation(
+    "motion": Declared(
         {
             "translation": Judged(1, "scene unit", oracle="motion.motion_forward"),
             "d_motion_coefficients": Judged(2, "loss per scene unit", "last", "motion.motion_reverse"),

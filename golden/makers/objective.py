@@ -9,18 +9,18 @@ from collections.abc import Callable
 
 import numpy as np
 
-from endotsr.port.stages.requests import raster_dict
-from endotsr.port.stages.scene import TWICE
+from endotsr.port.operations.requests import raster_dict
+from endotsr.port.operations.scene import TWICE
 from endotsr.training.scene.gaussians import Gaussians
 from makers.images import tissue
 from makers.making import Made, Seeds, Spec, changed, given
 from makers.moving import LENS, TIME, model_settings, moving_inputs
-from makers.operations import PER_DISPLAY, PER_LENGTH, Judged, Operation
+from makers.operations import PER_DISPLAY, PER_LENGTH, Declared, Judged
 from makers.views import PRESETS
 
 GRADIENT_UNITS = {"position": PER_LENGTH, "motion_coefficients": PER_LENGTH}
 DECLARED = {
-    "objective": Operation(
+    "objective": Declared(
         {
             "colour_image": Judged(3, "display", oracle="render.render_forward"),
             "depth_image": Judged(3, "scene unit", oracle="render.render_forward"),
@@ -41,7 +41,7 @@ DECLARED = {
         " is off; without `model.laplacian` there is no Laplacian term. With `exposure_log_gain` and `exposure_bias`,"
         " those of this frame, every term reads the exposed render (B13), and so does `colour_image`",
     ),
-    "determinism": Operation(
+    "determinism": Declared(
         {
             **{f"{name}_1": Judged(5, "loss") for name in TWICE},
             **{f"{name}_2": Judged(5, "loss", f"identical {name}_1") for name in TWICE},

@@ -22,13 +22,13 @@ class Judged(NamedTuple):
     order: str = ""  # "iteration": entry k is of iteration k + 1
 
 
-class Operation(NamedTuple):
+class Declared(NamedTuple):
     """An operation.
 
     outputs    every output, further output and gradient in order, with its level, its unit, the scale of its
                comparison, and the independent program that computes its value
     note       of its row in the table of golden/README.md
-    equations  in that row, where they are more than the one of the stage
+    equations  in that row, where they are more than the one of the operation
     settings   setting of a case -> key of the configuration with the same value, where the name is not this key
     free       keys of the configuration that no case must vary, with the reason; see `makers.hard_coded`
     """

@@ -20,7 +20,7 @@ from endotsr.config import (
     TrainingConfig,
 )
 from endotsr.method.splatting.settings import LEGACY, PAPER, LegacyDeviations, RasterSettings
-from endotsr.port.stages.requests import raster_dict
+from endotsr.port.operations.requests import raster_dict
 from makers.initialisation import LENS as SMALL_LENS
 from makers.initialisation import frames
 from makers.making import Made, Seeds, Spec, changed, given
@@ -48,8 +48,8 @@ CASE = "other_settings"
 TITLE = "Settings that are not the published ones"
 
 
-def _stages() -> list[Spec]:
-    """One stage each."""
+def _operations() -> list[Spec]:
+    """One operation each."""
     colour, views, steps = Seeds("appearance", CASE), Seeds("calibration", CASE), Seeds("adam", CASE)
     gradients = {
         name: views.uniform(name, -1.0, 1.0, 3, 3, 3, 4, unit="loss per display unit")
@@ -234,5 +234,5 @@ def _trajectories() -> list[Spec]:
 
 
 def cases() -> list[Spec]:
-    """Stages, the splatting, the first Gaussians, schedules, whole scenes and trajectories."""
-    return [*_stages(), *_splatting(), *_schedule(), _initialisation(), *_moving_scenes(), *_trajectories()]
+    """Operations, the splatting, the first Gaussians, schedules, whole scenes and trajectories."""
+    return [*_operations(), *_splatting(), *_schedule(), _initialisation(), *_moving_scenes(), *_trajectories()]

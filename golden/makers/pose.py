@@ -6,10 +6,10 @@ by an angle at which the closed forms lose digits.
 """
 
 from makers.making import Made, Seeds, Spec
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "pose": Operation(
+    "pose": Declared(
         {
             "corrected_rotation": Judged(1, oracle="pose_oracle.corrected"),
             "corrected_translation": Judged(1, "scene", oracle="pose_oracle.corrected"),

@@ -9,12 +9,12 @@ import numpy as np
 
 from endotsr.method.splatting.settings import PAPER
 from makers.making import Seeds, Spec, given
-from makers.operations import PER_LENGTH, Judged, Operation
+from makers.operations import PER_LENGTH, Declared, Judged
 from makers.views import PRESETS, lens_settings, pose, seen_at, shape_inputs, spread_points
 
 FORWARD = "projection.projection_forward"
 DECLARED = {
-    "projection": Operation(
+    "projection": Declared(
         {
             "visible": Judged(1, scale="exact"),
             "mean2d": Judged(1, "px", "last", FORWARD),

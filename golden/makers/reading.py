@@ -7,10 +7,10 @@ or the pixel centres before its equations are judged.
 import numpy as np
 
 from makers.making import Spec, given, scalar
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "reading": Operation(
+    "reading": Declared(
         {
             **{name: Judged(0, scale="exact") for name in ("column", "flat", "scalar", "empty")},
             **{name: Judged(0, scale="exact") for name in ("tissue_pixels", "tissue_row")},
@@ -20,7 +20,7 @@ DECLARED = {
         " are; `tissue_pixels` = number of True; `tissue_row` = columns that are True in row `row` of `mask`;"
         " `sample_x`, `sample_y` = sample positions of all columns, rows",
     ),
-    "generator": Operation(
+    "generator": Declared(
         {name: Judged(0, scale="exact") for name in ("words", "unit_numbers")},
         "the first `count` words of `seed`; `unit_numbers` = (word >> 40) / 2^24",
     ),

@@ -9,11 +9,11 @@ independent.
 import numpy as np
 
 from makers.making import Made, Seeds, Spec, changed, given
-from makers.operations import PER_LENGTH, Judged, Operation
+from makers.operations import PER_LENGTH, Declared, Judged
 
 FORWARD, REVERSE = "registration.registration_forward", "registration.registration_reverse"
 DECLARED = {
-    "registration": Operation(
+    "registration": Declared(
         {
             "residual": Judged(1, "unit of the picture", oracle=FORWARD),
             "seen": Judged(1, scale="exact", oracle=FORWARD),

@@ -14,7 +14,7 @@ from types import ModuleType
 
 from endotsr.port.contract import all_operations
 from makers.making import Spec
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 from makers.wrong import WrongPort, wrong_ports
 
 HERE = Path(__file__).parent
@@ -62,14 +62,14 @@ def all_wrong_ports() -> dict[str, WrongPort]:
     return found
 
 
-def all_declared() -> dict[str, Operation]:
+def all_declared() -> dict[str, Declared]:
     """What the families declare of every operation, in their order.
 
     Raises: ValueError for an operation that is declared twice.
     """
-    found: dict[str, Operation] = {}
+    found: dict[str, Declared] = {}
     for family in families():
-        declared: Mapping[str, Operation] = getattr(family, "DECLARED", {})
+        declared: Mapping[str, Declared] = getattr(family, "DECLARED", {})
         if twice := sorted(declared.keys() & found.keys()):
             raise ValueError(f"{family.__name__}: operation {', '.join(twice)} is declared twice")
         found |= declared

@@ -12,11 +12,11 @@ import numpy as np
 from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
 from makers.composite import UNITS
 from makers.making import Made, Seeds, Spec, changed, given
-from makers.operations import PER_DISPLAY, PER_LENGTH, Judged, Operation
+from makers.operations import PER_DISPLAY, PER_LENGTH, Declared, Judged
 from makers.views import LENS, cotangents, lens_settings, logit_of, pose, scene_inputs
 
 DECLARED = {
-    "render": Operation(
+    "render": Declared(
         {
             **{name: Judged(3, unit, oracle="render.render_forward") for name, unit in UNITS.items()},
             "visible": Judged(3, scale="exact"),

@@ -6,10 +6,10 @@ test the normalisation of the atoms, the order of the ten offsets, and offsets b
 
 from makers.making import Seeds, Spec
 from makers.moving import TIME, model_settings, moving_inputs
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 
 DECLARED = {
-    "scene": Operation(
+    "scene": Declared(
         {
             "position_at_t": Judged(1, "scene unit", "last", "motion.motion_forward"),
             "quaternion_at_t": Judged(1, "1", "last", "deformation.deformation_forward"),

@@ -7,9 +7,9 @@ before and after them, and a short run with the opposite choices.
 import numpy as np
 
 from endotsr.config import Config, DensityConfig, LossConfig, ModelConfig, OptimiserConfig, TrainingConfig
-from endotsr.port.stages.optimiser import RESIDUAL_RATES
+from endotsr.port.operations.optimiser import RESIDUAL_RATES
 from makers.making import Spec, given
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 from makers.settings import written
 
 RATES = [
@@ -17,7 +17,7 @@ RATES = [
     "fdm_weight_other", "fdm_centre", "fdm_width", *RESIDUAL_RATES,
 ]  # fmt: skip
 DECLARED = {
-    "schedule": Operation(
+    "schedule": Declared(
         {
             **{f"rate_{name}": Judged(1, "per step", oracle="schedules.learning_rates") for name in RATES},
             "laplacian_weight": Judged(1, oracle="schedules.learning_rates"),

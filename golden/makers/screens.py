@@ -3,7 +3,7 @@
 import numpy as np
 
 from endotsr.method.splatting.settings import RasterSettings
-from endotsr.port.stages.requests import raster_dict
+from endotsr.port.operations.requests import raster_dict
 from makers.making import Made, Seeds, given, permutation
 from makers.views import preset_of
 

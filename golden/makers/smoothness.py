@@ -8,10 +8,10 @@ import numpy as np
 
 from makers.images import HEIGHT, WIDTH, nothing, tool_mask
 from makers.making import Seeds, Spec, given, scalar
-from makers.operations import PER_DISPLAY, PER_LENGTH, Judged, Operation
+from makers.operations import PER_DISPLAY, PER_LENGTH, Declared, Judged
 
 DECLARED = {
-    "smoothness": Operation(
+    "smoothness": Declared(
         {
             "loss": Judged(1, "scene unit^2", oracle="smoothness.smoothness_forward"),
             "d_rendered": Judged(2, PER_DISPLAY, oracle="smoothness.smoothness_forward"),

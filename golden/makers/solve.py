@@ -11,8 +11,8 @@ from endotsr.method.splatting.render import Compositor
 from endotsr.port.judge.compare import distances, fingerprint, largest, misses
 from endotsr.port.judge.format import FLIP_BUDGET, Array, Because, Case, Mistake, Output, Rule, Shown, Truth
 from endotsr.port.judge.words import signs
+from endotsr.port.operations.operation import Inputs, Operation, Outputs
 from endotsr.port.reference import reference, stored
-from endotsr.port.stages.stage import Inputs, Outputs, Stage
 from makers.making import Spec
 from makers.operations import Judged
 from makers.registry import JUDGED
@@ -50,7 +50,7 @@ def stored_inputs(spec: Spec) -> dict[str, NDArray]:
     return {name: stored(made.array) for name, made in spec.inputs.items()}
 
 
-def solve(spec: Spec, operation: Stage, wrong: Mapping[str, Wrong] | None) -> Solved:
+def solve(spec: Spec, operation: Operation, wrong: Mapping[str, Wrong] | None) -> Solved:
     """A case with its answers.
 
     wrong    answers of wrong ports, by flag; None omits the mistakes
@@ -129,7 +129,7 @@ def _shaken(spec: Spec, inputs: Inputs, step: float, draw: int) -> dict[str, NDA
 
 
 def _spreads(
-    spec: Spec, operation: Stage, inputs: Inputs, answers: tuple[Outputs, ...], asked: dict[str, Judged]
+    spec: Spec, operation: Operation, inputs: Inputs, answers: tuple[Outputs, ...], asked: dict[str, Judged]
 ) -> dict[str, tuple[float, float]]:
     def run(arrays: Inputs, precision: str, compositor: Compositor = "definition") -> Outputs:
         return reference(operation, arrays, spec.settings, precision, compositor)
@@ -162,7 +162,7 @@ def _finite(value: float) -> float:
     return value
 
 
-def _flip_budgets(spec: Spec, operation: Stage, inputs: Inputs, expected: Outputs, rules: dict[str, Rule]):
+def _flip_budgets(spec: Spec, operation: Operation, inputs: Inputs, expected: Outputs, rules: dict[str, Rule]):
     """Flip budgets: entries that change when the cutoff moves by FLIP_STEP, and by how much."""
     raster, found = spec.settings["raster"], {}
     cut = raster["alpha_cutoff"]

@@ -7,7 +7,7 @@ among the densifications that are left by a trajectory with three of them.
 
 from endotsr.config import Config, DensityConfig, LossConfig, ModelConfig, OptimiserConfig, RasterConfig, TrainingConfig
 from endotsr.method.splatting.settings import PAPER
-from endotsr.port.stages.requests import raster_dict
+from endotsr.port.operations.requests import raster_dict
 from makers.density import density_spec, spread_gradients
 from makers.making import Seeds, Spec, changed
 from makers.moving import BASES, LENS, TIME, model_settings, moving_inputs

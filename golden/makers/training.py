@@ -18,18 +18,18 @@ from endotsr.config import (
     TrainingConfig,
 )
 from endotsr.definition.exposure import EXPOSURES
-from endotsr.port.stages.optimiser import SQUARES, STATE, TERMS
+from endotsr.port.operations.optimiser import SQUARES, STATE, TERMS
 from endotsr.training.scene.gaussians import Gaussians
 from makers.clock import stamps, train_index
 from makers.images import tissue
 from makers.making import Made, Seeds, Spec, changed, given
 from makers.moving import BASES, FRAMES, FREQUENCIES, LENS
-from makers.operations import Judged, Operation
+from makers.operations import Declared, Judged
 from makers.settings import written
 from makers.views import pose, scene_inputs
 
 DECLARED = {
-    "training": Operation(
+    "training": Declared(
         {
             "lambda_lap": Judged(4),
             **{name: Judged(4, order="iteration") for name in TERMS},

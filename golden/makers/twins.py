@@ -1,6 +1,6 @@
 """The comparison of every compiled function with its definition in plain NumPy (`endotsr.definition`), in float64.
 
-In: a stage, its twin and requests (arrays and settings by name, cotangents included). Out: for every output and
+In: an operation, its twin and requests (arrays and settings by name, cotangents included). Out: for every output and
 gradient the largest difference in units of its scale, which for most arrays is their largest magnitude. The test and
 the table of the book use the bounds of this module.
 """
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from endotsr.port.gradcheck.registry import one_thread, pair_stream
 from endotsr.port.judge.compare import largest
 from endotsr.port.judge.store import Golden
-from endotsr.port.stages.definition import definition_stages
-from endotsr.port.stages.registry import all_stages
-from endotsr.port.stages.stage import Inputs, Settings, Stage
+from endotsr.port.operations.definition import definition_operations
+from endotsr.port.operations.operation import Inputs, Operation, Settings
+from endotsr.port.operations.registry import method_operations
 from makers.operations import Judged
 from makers.registry import JUDGED
 
@@ -50,9 +50,9 @@ class TwinRequest(NamedTuple):
 
 
 class Distance(NamedTuple):
-    """The largest difference of one output over all requests of a stage."""
+    """The largest difference of one output over all requests of an operation."""
 
-    stage: str
+    operation: str
     function: str  # of the definition
     output: str
     distance: float  # in units of the scale
@@ -60,14 +60,14 @@ class Distance(NamedTuple):
     request: str  # where it is largest
 
 
-def made_up(stage: Stage, seeds: Iterable[int] = SEEDS) -> Iterator[TwinRequest]:
-    """The inputs of the gradient checks of a stage, with a random cotangent for every output."""
-    for variant in stage.variants:
+def made_up(operation: Operation, seeds: Iterable[int] = SEEDS) -> Iterator[TwinRequest]:
+    """The inputs of the gradient checks of an operation, with a random cotangent for every output."""
+    for variant in operation.variants:
         for seed in seeds:
             rng = pair_stream(variant.name, seed)
             inputs = variant.inputs(rng)
             inputs |= {} if variant.fixed is None else variant.fixed(np.dtype(np.float64))
-            outputs, _ = stage.forward(inputs, variant.settings)
+            outputs, _ = operation.forward(inputs, variant.settings)
             cotangents = {f"d_{name}": rng.normal(0, 1, np.asarray(value).shape) for name, value in outputs.items()}
             yield TwinRequest(f"{variant.name}, seed {seed}", inputs | cotangents, variant.settings)
 
@@ -81,7 +81,7 @@ def scaled(got: NDArray, wanted: NDArray, scale: str) -> float:
 
 
 def golden_requests(golden: Golden) -> Iterator[tuple[str, TwinRequest]]:
-    """(name of the stage, request) of every case."""
+    """(name of the operation, request) of every case."""
     for case in golden.cases:
         inputs = {name: golden.array(case, array.file) for name, array in case.inputs.items()}
         asked = tuple(name for name, output in case.outputs.items() if output.compare.float64 < ANY_VALUE)
@@ -89,17 +89,17 @@ def golden_requests(golden: Golden) -> Iterator[tuple[str, TwinRequest]]:
 
 
 def distances(
-    stage: Stage, twin: Stage, requests: Iterable[TwinRequest], judged: Mapping[str, Judged]
+    operation: Operation, twin: Operation, requests: Iterable[TwinRequest], judged: Mapping[str, Judged]
 ) -> list[Distance]:
-    """The worst difference of every output of the stage over all requests, with separate rows for `APART`.
+    """The worst difference of every output of the operation over all requests, with separate rows for `APART`.
 
-    judged   the outputs of the stage, as in `makers.registry`
+    judged   the outputs of the operation, as in `makers.registry`
     """
     worst: dict[tuple[str, str], tuple[float, str]] = {}
     for request in requests:
-        name = APART.get(request.label, stage.name)
+        name = APART.get(request.label, operation.name)
         with one_thread(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            wanted = stage.compute(request.inputs, request.settings)
+            wanted = operation.compute(request.inputs, request.settings)
             got = twin.compute(request.inputs, request.settings)
         for output in request.asked or [output for output in judged if output in wanted]:
             missing = np.array(np.nan)
@@ -113,11 +113,11 @@ def distances(
 
 
 def all_distances(stored: Iterable[tuple[str, TwinRequest]] = ()) -> list[Distance]:
-    """Every stage on its generated inputs and on further requests, given as (stage name, request)."""
+    """Every operation on its generated inputs and on further requests, given as (operation name, request)."""
     more: dict[str, list[TwinRequest]] = {}
     for name, request in stored:
         more.setdefault(name, []).append(request)
-    stages, found = all_stages(), []
-    for name, twin in definition_stages().items():
-        found += distances(stages[name], twin, [*made_up(stages[name]), *more.get(name, ())], JUDGED[name])
+    operations, found = method_operations(), []
+    for name, twin in definition_operations().items():
+        found += distances(operations[name], twin, [*made_up(operations[name]), *more.get(name, ())], JUDGED[name])
     return found

@@ -6,7 +6,7 @@ import numpy as np
 
 from endotsr.method.splatting.covariance import covariance_forward
 from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
-from endotsr.port.stages.requests import raster_dict
+from endotsr.port.operations.requests import raster_dict
 from makers.making import Made, Seeds, changed, given, permutation, single
 
 PRESETS = {"exact": EXACT, "paper": PAPER, "legacy": LEGACY}

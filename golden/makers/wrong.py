@@ -14,8 +14,8 @@ import numpy as np
 
 from endotsr.port.judge.npy import write_npy
 from endotsr.port.judge.store import Golden, in_precision
+from endotsr.port.operations.operation import Inputs, Outputs
 from endotsr.port.reference import stored
-from endotsr.port.stages.stage import Inputs, Outputs
 from makers.copies import Edit, changed_copy, without_compiler
 
 

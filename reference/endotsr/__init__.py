@@ -16,7 +16,7 @@ The storeys of the package, from the ground up. Each imports only what stands ab
     studies             benchmarks, sweeps, windows of long recordings
     api, cli            the Python interface, and the commands
 
-Every forward pass `<stage>_forward` has its manual reverse pass `<stage>_reverse` directly below it.
+Every forward pass `<operation>_forward` has its manual reverse pass `<operation>_reverse` directly below it.
 """
 
 TYPE_CHECKING = False  # as in `typing`, whose import would be the heaviest part of this one

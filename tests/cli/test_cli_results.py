@@ -290,7 +290,7 @@ def test_demo_is_the_simulated_sequence_on_its_preset(tmp_path, capsys):
 
 
 def test_check_command_names_what_it_does_not_know(capsys):
-    assert_refused(capsys, ["gradcheck", "no_such_stage"], "no_such_stage")
+    assert_refused(capsys, ["gradcheck", "no_such_operation"], "no_such_operation")
 
 
 def test_tradeoff_takes_a_run_without_held_out_frames(run_copy):

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from endotsr.port.judge.compare import judged
 from endotsr.port.judge.format import Case
 from endotsr.port.judge.store import Golden, golden_folder, read_golden
-from endotsr.port.stages.definition import definition_stages, twins
+from endotsr.port.operations.definition import definition_operations, twins
 from notebook_signs import flipped, signs_of
 
 FOLDER = Path(inspect.getfile(importlib.import_module("endotsr.definition"))).parent
@@ -68,7 +68,7 @@ def notices(golden: Golden, case: Case) -> bool:
     inputs = {name: golden.array(case, array.file) for name, array in case.inputs.items()}
     try:
         with np.errstate(all="ignore"):
-            found = definition_stages()[case.operation].compute(inputs, case.settings)
+            found = definition_operations()[case.operation].compute(inputs, case.settings)
             for number in range(case.answers):
                 right = {name: golden.array(case, output.answer(number)) for name, output in case.outputs.items()}
                 rules = {name: output.compare for name, output in case.outputs.items()}

@@ -13,41 +13,43 @@ from endotsr.method.splatting.covariance import covariance_forward
 from endotsr.method.splatting.render import Scene, render_forward, render_reverse
 from endotsr.method.splatting.settings import PRESETS
 from endotsr.port.judge.store import golden_folder, read_golden
-from endotsr.port.stages.definition import definition_stages
-from endotsr.port.stages.registry import all_stages
+from endotsr.port.operations.definition import definition_operations
+from endotsr.port.operations.registry import method_operations
 from makers.registry import JUDGED
 from makers.twins import BOUNDS, distances, golden_requests, made_up, scaled
 
-STAGES, TWINS = all_stages(), definition_stages()
+OPERATIONS, TWINS = method_operations(), definition_operations()
 STORED = list(golden_requests(read_golden(golden_folder())))
 REFERENCE_ALONE = {"determinism"}  # asks for the same bits twice, of one program
 
 
 @pytest.mark.parametrize("name", TWINS)
 def test_the_compiled_function_computes_its_definition(name):
-    requests = [*made_up(STAGES[name]), *(request for stage, request in STORED if stage == name)]
-    found = distances(STAGES[name], TWINS[name], requests, JUDGED[name])
+    requests = [*made_up(OPERATIONS[name]), *(request for operation, request in STORED if operation == name)]
+    found = distances(OPERATIONS[name], TWINS[name], requests, JUDGED[name])
     assert {d.output for d in found} <= JUDGED[name].keys() and found
     assert [d for d in found if not d.distance <= d.bound] == []
 
 
-def test_every_stage_has_a_twin():
-    assert STAGES.keys() - TWINS.keys() == REFERENCE_ALONE
+def test_every_operation_has_a_twin():
+    assert OPERATIONS.keys() - TWINS.keys() == REFERENCE_ALONE
     for name, twin in TWINS.items():
-        assert (twin.reverse is None) == (STAGES[name].reverse is None), name
+        assert (twin.reverse is None) == (OPERATIONS[name].reverse is None), name
         assert twin.function.startswith("endotsr.definition."), name
 
 
 def test_a_wrong_function_is_seen():
     """A gradient that is off by 1e-12 in one entry, a missing one and another integer."""
-    stage, twin = STAGES["motion"], TWINS["motion"]
+    operation, twin = OPERATIONS["motion"], TWINS["motion"]
 
     def wrong(cotangents, saved):
         found = twin.reverse(cotangents, saved)
         found["d_phi"] = found["d_phi"] * (1 + 1e-12 * (np.arange(6) == 2))
         return {name: found[name] for name in ("d_phi",)}
 
-    found = {d.output: d for d in distances(stage, twin._replace(reverse=wrong), made_up(stage), JUDGED["motion"])}
+    found = {
+        d.output: d for d in distances(operation, twin._replace(reverse=wrong), made_up(operation), JUDGED["motion"])
+    }
     assert found["d_phi"].distance > found["d_phi"].bound
     assert found["d_motion_coefficients"].distance == np.inf
     assert found["translation"].distance <= found["translation"].bound

@@ -1,4 +1,4 @@
-"""The guide *Add a component* is executed: its definition, code, stage, twin and notebook cell fit the package."""
+"""The guide *Add a component* is executed: its definition, code, operation, twin and notebook cell fit the package."""
 
 import re
 import sys
@@ -11,12 +11,12 @@ import pytest
 import endotsr.definition
 import endotsr.method.losses  # noqa: F401
 from endotsr.port.gradcheck import check_pair, check_precision, one_thread, pair_of, pair_stream
-from endotsr.port.stages.definition import twin_of
+from endotsr.port.operations.definition import twin_of
 from makers.twins import distances, made_up
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "add_component.md"
 SQUARED, DEFINITION = "reference/endotsr/method/losses/squared.py", "reference/endotsr/definition/squared.py"
-STAGES, FAMILY = "reference/endotsr/port/stages/losses.py", "golden/makers/masked_squared.py"
+OPERATIONS, FAMILY = "reference/endotsr/port/operations/losses.py", "golden/makers/masked_squared.py"
 NOTEBOOK = "notebooks/11_base_losses.py"
 BLOCKS = re.findall(r"^```python\n# (\S+)\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
@@ -37,9 +37,9 @@ def component(monkeypatch):
 
 
 def test_the_guide_has_a_block_for_each_step():
-    assert [path for path, _ in BLOCKS] == [DEFINITION, SQUARED, STAGES, FAMILY, NOTEBOOK]
+    assert [path for path, _ in BLOCKS] == [DEFINITION, SQUARED, OPERATIONS, FAMILY, NOTEBOOK]
     root = GUIDE.parents[2]
-    assert all((root / path).is_file() for path in (STAGES, NOTEBOOK)), "the guide names files that exist"
+    assert all((root / path).is_file() for path in (OPERATIONS, NOTEBOOK)), "the guide names files that exist"
     assert all((root / path).parent.is_dir() for path, _ in BLOCKS), "a new file is in a folder that exists"
 
 
@@ -55,18 +55,20 @@ def test_the_component_agrees_with_its_definition(component):
     assert component[SQUARED].masked_squared_forward(rendered, observed, mask)[0] == loss
 
 
-def test_the_stage_agrees_with_its_twin(component):
-    (stage,), judged = component[STAGES].STAGES, component[FAMILY].DECLARED["masked_squared"].outputs
-    twin = twin_of(stage)
+def test_the_operation_agrees_with_its_twin(component):
+    (operation,), judged = component[OPERATIONS].OPERATIONS, component[FAMILY].DECLARED["masked_squared"].outputs
+    twin = twin_of(operation)
     assert twin.forward.__self__.forward is component[DEFINITION].masked_squared_forward
-    found = distances(stage, stage._replace(forward=twin.forward, reverse=twin.reverse), made_up(stage), judged)
+    found = distances(
+        operation, operation._replace(forward=twin.forward, reverse=twin.reverse), made_up(operation), judged
+    )
     assert {d.output for d in found} == {"loss", "d_rendered"} and all(d.distance <= d.bound for d in found)
 
 
-def test_the_stage_passes_the_gradient_check(component):
-    (stage,) = component[STAGES].STAGES
-    (variant,) = stage.variants
-    pair = pair_of(stage, variant)
+def test_the_operation_passes_the_gradient_check(component):
+    (operation,) = component[OPERATIONS].OPERATIONS
+    (variant,) = operation.variants
+    pair = pair_of(operation, variant)
     with one_thread():
         report = check_pair(pair, pair_stream(pair.name, 0))
         precision = check_precision(pair, pair_stream(pair.name, 0))
@@ -74,9 +76,9 @@ def test_the_stage_passes_the_gradient_check(component):
     assert precision.passed, precision.failures
 
 
-def test_the_stage_answers_what_is_judged(component):
-    (stage,) = component[STAGES].STAGES
+def test_the_operation_answers_what_is_judged(component):
+    (operation,) = component[OPERATIONS].OPERATIONS
     rng = np.random.default_rng(1)
     inputs = {"rendered": rng.random((3, 4, 4)), "observed": rng.random((3, 4, 4)), "mask": np.ones((4, 4), bool)}
-    found = stage.compute({**inputs, "d_loss": np.array(1.0)}, {})
-    assert set(found) == set(component[FAMILY].DECLARED[stage.name].outputs)
+    found = operation.compute({**inputs, "d_loss": np.array(1.0)}, {})
+    assert set(found) == set(component[FAMILY].DECLARED[operation.name].outputs)

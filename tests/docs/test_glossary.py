@@ -34,10 +34,10 @@ FORBIDDEN_WORDS = {
 }
 # Words that mean one thing, and the rooms that have it. Elsewhere the thing has another name.
 RESERVED = {
-    "moment": {"definition", "fitting", "losses", "stages"},
-    "moments": {"definition", "fitting", "losses", "stages"},
-    "band": {"definition", "equations", "stages"},
-    "bands": {"definition", "equations", "fitting", "stages"},
+    "moment": {"definition", "fitting", "losses", "operations"},
+    "moments": {"definition", "fitting", "losses", "operations"},
+    "band": {"definition", "equations", "operations"},
+    "bands": {"definition", "equations", "fitting", "operations"},
     "bridged": {"fitting"},
 }
 # Modules of `fitting` that name moments, which are Adam's; a time between two frames is a bridged time.

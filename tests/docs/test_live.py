@@ -13,7 +13,7 @@ import pytest
 from pages.live import fetch, helpers, page
 from pages.live.bundle import CHAPTERS, cells, files, formulas, needs_clip
 from pages.live.supply import LOCK, File, Supply, needed, supply
-from pages.live.table import HOMES, OWN, STAGES
+from pages.live.table import HOMES, OPERATIONS, OWN
 
 ROOT = Path(__file__).parents[2]
 # What Pyodide's packages bring, and the files of the page; everything else that is installed here is absent there.
@@ -117,7 +117,7 @@ def test_every_name_of_the_table_is_in_the_compiled_module_and_in_the_definition
             for name in names.split():
                 assert hasattr(import_module(compiled), name), (compiled, name)
                 assert hasattr(import_module(f"endotsr.definition.{home}"), name), (home, name)
-    assert all((ROOT / f"reference/endotsr/port/stages/{name}.py").is_file() for name in STAGES)
+    assert all((ROOT / f"reference/endotsr/port/operations/{name}.py").is_file() for name in OPERATIONS)
 
 
 def test_the_report_of_the_atoms_is_that_of_the_package():

@@ -38,7 +38,7 @@ def sections(data, where=""):
 
 
 def raster_of(settings):
-    """Settings of the rasteriser by name, as `endotsr.port.stages.requests.raster_of`."""
+    """Settings of the rasteriser by name, as `endotsr.port.operations.requests.raster_of`."""
     fields = dict(settings["raster"])
     return RasterSettings(**fields | {"deviations": LegacyDeviations(**fields["deviations"])})
 

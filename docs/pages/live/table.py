@@ -39,8 +39,8 @@ HOMES = {
     "endotsr.training.fitting.model": {"scene": "Spectral spectral_from"},
     "endotsr.training.scene.gaussians": {"scene": "Gaussians"},
 }
-# The modules of `endotsr.port.stages` with the gradient checks of the chapters that run.
-STAGES = ("spectral", "laplacian", "deformation", "projection", "pose")
+# The modules of `endotsr.port.operations` with the gradient checks of the chapters that run.
+OPERATIONS = ("spectral", "laplacian", "deformation", "projection", "pose")
 # Compiled module -> names that are written in `helpers`, and constants.
 OWN = {
     "endotsr.config": {"Config": object, "config_from_dict": helpers.sections},
@@ -52,7 +52,7 @@ OWN = {
         name: getattr(helpers, name)
         for name in ("projection_forward", "projection_reverse", "projection_reverse_footprint")
     },
-    "endotsr.port.stages.requests": {
+    "endotsr.port.operations.requests": {
         name: getattr(helpers, name) for name in ("camera_of", "raster_dict", "raster_of")
     },
 }
@@ -95,7 +95,7 @@ class Homes(MetaPathFinder, Loader):
 def install():
     """Import compiled modules from the table from now on, and check gradients on one thread."""
     sys.meta_path.append(Homes())
-    replaced = {"gradcheck": {"one_thread": contextlib.nullcontext}, "stages.registry": {"STAGE_MODULES": STAGES}}
+    replaced = {"gradcheck": {"one_thread": contextlib.nullcontext}, "operations.registry": {"MODULES": OPERATIONS}}
     for name, values in replaced.items():
         vars(importlib.import_module(f"endotsr.port.{name}")).update(values)
     # The signs of (5) are decisions of the forward pass. The definition saves them with their weight.

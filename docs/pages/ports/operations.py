@@ -20,9 +20,9 @@ def listed(names: Iterable[str]) -> str:
 def operations() -> str:
     """One row for each operation: its equations and its note."""
     rows = []
-    for name, stage in all_operations().items():
+    for name, operation in all_operations().items():
         declared = DECLARED[name]
-        label = f"({stage.equation})" if stage.equation else ""
+        label = f"({operation.equation})" if operation.equation else ""
         rows.append((f"`{name}`", declared.equations or label, declared.note))
     return markdown(("Operation", "Equation", "Notes"), rows)
 

@@ -1,6 +1,6 @@
 """A port in PyTorch: forward passes only, gradients by automatic differentiation. python port.py REQUESTS OUTPUTS
 
-It answers the stages up to level 2 and `render`, in presets exact and paper; the deviations of preset legacy are no
+It answers the operations up to level 2 and `render`, in presets exact and paper; the deviations of preset legacy are no
 derivatives, and its cases are left out. Every function takes tensors by name and settings, and returns outputs by name.
 """
 

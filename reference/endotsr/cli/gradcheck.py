@@ -13,7 +13,7 @@ class GradcheckOptions:
     """Compare reverse passes in float64 with finite differences; exit code 1 if a check fails."""
 
     names: Annotated[tuple[str, ...], Option("[NAME ...]", positional=True)] = ()
-    """stages to check (default: all)"""
+    """operations to check (default: all)"""
     seed: int = 0
     """seed of inputs and directions"""
     definition: bool = False

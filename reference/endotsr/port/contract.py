@@ -1,14 +1,14 @@
 """The operations of golden cases.
 
 Two belong only to the contract and have no equation: the layout of arrays, and the generator of the inputs. All others
-are the stages of the method.
+are the operations of the method.
 """
 
 import numpy as np
 
 from endotsr.port.judge.words import fnv1a, unit_numbers, words
-from endotsr.port.stages.registry import all_stages
-from endotsr.port.stages.stage import Found, Inputs, Settings, Stage
+from endotsr.port.operations.operation import Found, Inputs, Operation, Settings
+from endotsr.port.operations.registry import method_operations
 
 
 def _reading(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
@@ -30,15 +30,15 @@ def _generator(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     return {"words": found, "unit_numbers": unit_numbers(found)}, None
 
 
-STAGES = [
-    Stage(
+OPERATIONS = [
+    Operation(
         name="reading",
         equation="",
         text="echo parts of the inputs",
         function="",
         forward=_reading,
     ),
-    Stage(
+    Operation(
         name="generator",
         equation="",
         text="words of the written-out generator",
@@ -48,6 +48,6 @@ STAGES = [
 ]
 
 
-def all_operations() -> dict[str, Stage]:
-    """Every operation by name: the two of the contract, then the stages of the method."""
-    return {stage.name: stage for stage in STAGES} | all_stages()
+def all_operations() -> dict[str, Operation]:
+    """Every operation by name: the two of the contract, then the operations of the method."""
+    return {operation.name: operation for operation in OPERATIONS} | method_operations()

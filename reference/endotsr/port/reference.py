@@ -13,10 +13,10 @@ from endotsr.port.contract import all_operations
 from endotsr.port.judge.format import Precision, Request, Requests, read_struct
 from endotsr.port.judge.npy import Refused, read_plain, write_npy
 from endotsr.port.judge.store import Golden, in_precision
-from endotsr.port.stages.stage import Inputs, Outputs, Stage
+from endotsr.port.operations.operation import Inputs, Operation, Outputs
 
 
-def reference(operation: Stage, inputs: Inputs, settings: dict, precision: str, compositor: Compositor) -> Outputs:
+def reference(operation: Operation, inputs: Inputs, settings: dict, precision: str, compositor: Compositor) -> Outputs:
     """The reference's answer in one precision; compositor `blocks` uses fast compositing if applicable."""
     return operation.compute(in_precision(inputs, precision), settings | {"_compositor": compositor})
 

@@ -58,11 +58,11 @@ class Mixing:
         return {"matrix": d @ inputs["points"].T, "points": inputs["matrix"].T @ d}
 
 
-def with_mistake(stage, name, change):
-    """The stage's reverse pass with `change` applied to one gradient."""
+def with_mistake(operation, name, change):
+    """The operation's reverse pass with `change` applied to one gradient."""
 
     def reverse(inputs, cotangents):
-        gradients = stage.reverse(inputs, cotangents)
+        gradients = operation.reverse(inputs, cotangents)
         gradients[name] = change(gradients[name].copy(), inputs)
         return gradients
 
@@ -105,8 +105,10 @@ MISTAKES = {
 @pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_wrong_gradient_of_a_mean_loss_is_refused(mistake, count):
-    stage = Penalty(count)
-    report = check_function(stage.forward, with_mistake(stage, "coefficients", MISTAKES[mistake]), stage.inputs)
+    operation = Penalty(count)
+    report = check_function(
+        operation.forward, with_mistake(operation, "coefficients", MISTAKES[mistake]), operation.inputs
+    )
     assert not report.passed, table([report])
 
 
@@ -114,8 +116,8 @@ def test_wrong_gradient_of_a_mean_loss_is_refused(mistake, count):
 @pytest.mark.parametrize("power", [1, 3])
 def test_right_gradient_of_a_mean_loss_is_accepted(count, power):
     """power 3: gradient entries of 1e-13 and below; nothing is compared to an absolute number."""
-    stage = Penalty(count, power)
-    report = check_function(stage.forward, stage.reverse, stage.inputs)
+    operation = Penalty(count, power)
+    report = check_function(operation.forward, operation.reverse, operation.inputs)
     assert report.passed, table([report])
     assert sum(block.unresolved for block in report.blocks) == 0
 
@@ -132,19 +134,21 @@ def test_right_gradient_of_a_mean_loss_is_accepted(count, power):
     ],
     ids=["transposed", "one entry", "R for R^T", "one row's sign", "one Gaussian missing"],
 )
-def test_wrong_gradient_of_a_matrix_stage_is_refused(name, change, count):
-    stage = Mixing(count)
-    assert check_function(stage.forward, stage.reverse, stage.inputs).passed
-    report = check_function(stage.forward, with_mistake(stage, name, change), stage.inputs)
+def test_wrong_gradient_of_a_matrix_operation_is_refused(name, change, count):
+    operation = Mixing(count)
+    assert check_function(operation.forward, operation.reverse, operation.inputs).passed
+    report = check_function(operation.forward, with_mistake(operation, name, change), operation.inputs)
     assert not report.passed
     assert all(name in failure or "(all)" in failure for failure in report.failures), report.failures
 
 
 def test_shape_and_presence_of_gradients():
-    stage = Mixing(10)
-    transposed = with_mistake(stage, "points", lambda g, _: g.T.copy())
-    assert "shape (10, 3)" in check_function(stage.forward, transposed, stage.inputs).failures[0]
-    missing = check_function(stage.forward, lambda i, u: {"matrix": stage.reverse(i, u)["matrix"]}, stage.inputs)
+    operation = Mixing(10)
+    transposed = with_mistake(operation, "points", lambda g, _: g.T.copy())
+    assert "shape (10, 3)" in check_function(operation.forward, transposed, operation.inputs).failures[0]
+    missing = check_function(
+        operation.forward, lambda i, u: {"matrix": operation.reverse(i, u)["matrix"]}, operation.inputs
+    )
     assert missing.failures == ("no gradient for input points",)
 
 
@@ -161,10 +165,10 @@ def test_bare_arrays_and_numbers_are_accepted():
 
 @pytest.mark.parametrize("factor, accepted", [(1.0, True), (1.05, False), (-1.0, False)])
 def test_a_port_in_single_precision(factor, accepted):
-    stage = Mixing(10)
-    inputs = {name: value.astype(np.float32) for name, value in stage.inputs.items()}
-    wrong = with_mistake(stage, "points", scale_at(..., np.float32(factor)))
-    report = check_function(stage.forward, wrong, inputs, settings=SINGLE)
+    operation = Mixing(10)
+    inputs = {name: value.astype(np.float32) for name, value in operation.inputs.items()}
+    wrong = with_mistake(operation, "points", scale_at(..., np.float32(factor)))
+    report = check_function(operation.forward, wrong, inputs, settings=SINGLE)
     assert report.passed == accepted, table([report])
 
 
@@ -236,15 +240,15 @@ def test_a_derivative_below_rounding_is_unresolved_and_the_check_blind():
 
 
 def test_a_tolerance_that_accepts_the_negative_control_is_blind():
-    stage = Mixing(10)
-    report = check_function(stage.forward, stage.reverse, stage.inputs, settings=Settings(rtol=1e-3))
+    operation = Mixing(10)
+    report = check_function(operation.forward, operation.reverse, operation.inputs, settings=Settings(rtol=1e-3))
     assert any("blind" in failure for failure in report.failures)
 
 
 def test_inputs_outside_all_blocks_are_named():
-    stage = Mixing(10)
+    operation = Mixing(10)
     report = check_function(
-        stage.forward, stage.reverse, stage.inputs, blocks={"row 0": ("points", 0), "m": ("matrix", ...)}
+        operation.forward, operation.reverse, operation.inputs, blocks={"row 0": ("points", 0), "m": ("matrix", ...)}
     )
     assert report.failures == ("input points is not covered by the blocks",)
 
@@ -279,9 +283,15 @@ def test_judge_verdicts():
 
 
 def penalty_pair(reverse=None, **options) -> Pair:
-    stage = Penalty(10)
+    operation = Penalty(10)
     return Pair(
-        "penalty", "0", "tests.penalty", lambda rng: stage.inputs, stage.forward, reverse or stage.reverse, **options
+        "penalty",
+        "0",
+        "tests.penalty",
+        lambda rng: operation.inputs,
+        operation.forward,
+        reverse or operation.reverse,
+        **options,
     )
 
 

@@ -59,7 +59,7 @@ def test_same_seed_same_report(two_pairs, capsys):
 
 
 def test_unknown_name_and_unwritable_file(two_pairs, tmp_path):
-    with pytest.raises(InputError, match="'left' is not a registered stage; use right or wrong"):
+    with pytest.raises(InputError, match="'left' is not a registered operation; use right or wrong"):
         run(["left"], 0, None)
     with pytest.raises(InputError, match=r"missing/report\.json: cannot be written: .*missing is not a folder"):
         run(["right"], 0, tmp_path / "missing" / "report.json")

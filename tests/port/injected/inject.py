@@ -175,7 +175,7 @@ def in_torch(golden: Golden, only: Sequence[str]) -> Iterator[Outcome]:
 
 
 def _first_two(operations: tuple[str, ...]) -> list[str]:
-    """The stage itself and one more: the whole objective is not ported."""
+    """The operation itself and one more: the whole objective is not ported."""
     return [name for name in operations if name not in ("objective", "training")][:2]
 
 

@@ -1,7 +1,7 @@
 """The exposure within the whole method: real ports with one mistake of it are refused at its level and named.
 
-The port is the definition in NumPy with one function replaced. The stage alone (family `exposure`) stays right, so a
-refusal comes from the cases of `objective` and `training` that carry an exposure.
+The port is the definition in NumPy with one function replaced. The operation alone (family `exposure`) stays right, so
+a refusal comes from the cases of `objective` and `training` that carry an exposure.
 """
 
 import inspect
@@ -16,8 +16,8 @@ from endotsr.port.judge.case_verdict import judge_case
 from endotsr.port.judge.npy import write_npy
 from endotsr.port.judge.profiles import of_profile
 from endotsr.port.judge.verdict import conclude, judge
+from endotsr.port.operations.definition import definition_operations
 from endotsr.port.reference import stored
-from endotsr.port.stages.definition import definition_stages
 
 CASES = {"objective": "objective/exposed", "training": "training/exposed"}
 
@@ -25,7 +25,7 @@ CASES = {"objective": "objective/exposed", "training": "training/exposed"}
 def answered(golden, folder, operation):
     """The definition's answer to the exposed case of an operation, as it is now."""
     case = case_of(golden, CASES[operation])
-    found = definition_stages()[operation].compute(golden.inputs(case), dict(case.settings))
+    found = definition_operations()[operation].compute(golden.inputs(case), dict(case.settings))
     for name in case.outputs:
         write_npy(folder / case.name / f"{name}.npy", stored(found[name]))
     return case

@@ -12,8 +12,8 @@ sys.path[:0] = [str(Path(__file__).parents[1] / "unseen/by_hand"), str(Path(__fi
 import hand_port  # noqa: E402
 from mutants.kinds import Source  # noqa: E402
 
+from endotsr.port.operations.definition import definition_operations  # noqa: E402
 from endotsr.port.reference import stored  # noqa: E402
-from endotsr.port.stages.definition import definition_stages  # noqa: E402
 
 NOT_ASKED = ("__init__", "__main__", "metrics", "settings", "simulate")  # no operation of the cases runs them
 
@@ -34,7 +34,7 @@ class Port(NamedTuple):
 def definition() -> Port:
     """The definition in NumPy."""
     folder = Path(importlib.import_module("endotsr.definition").__file__ or "").parent
-    stages, sources = definition_stages(), []
+    operations, sources = definition_operations(), []
     for path in (path for path in sorted(folder.glob("*.py")) if path.stem not in NOT_ASKED):
         module = importlib.import_module(f"endotsr.definition.{path.stem}")
         functions = {n: f for n, f in vars(module).items() if getattr(f, "__module__", "") == module.__name__}
@@ -42,10 +42,10 @@ def definition() -> Port:
         sources.append(Source(path.stem, path.read_text("utf-8"), _plain(functions)))
 
     def answer(operation: str, inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-        found = stages[operation].compute(inputs, dict(settings))
+        found = operations[operation].compute(inputs, dict(settings))
         return {name: stored(np.asarray(value)) for name, value in found.items()}
 
-    return Port(sources, frozenset(stages), answer)
+    return Port(sources, frozenset(operations), answer)
 
 
 def by_hand() -> Port:

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from searched import search_on
 
+from endotsr.port.operations.definition import definition_operations
 from endotsr.port.search.conventions import Convention, prepared
 from endotsr.port.search.decisions import Interval, threshold
 from endotsr.port.search.find import sentences
 from endotsr.port.search.images import OF_IMAGES
 from endotsr.port.search.screen import OF_THE_SCREEN
-from endotsr.port.stages.definition import definition_stages
 
 GUIDE = Path(__file__).parents[3] / "docs" / "guides" / "port.md"
 FOUND = tomllib.loads(Path(__file__).with_name("conventions.toml").read_text("utf-8"))
@@ -30,13 +30,13 @@ OTHERS = {  # mistakes that are no convention of the lists, and none may be said
 
 
 def test_every_convention_fits_the_definition_and_is_said_once():
-    definition_stages()
+    definition_operations()
     said = [prepared(convention).said for convention in CONVENTIONS]
     assert len(set(said)) == len(CONVENTIONS) >= 60
 
 
 def test_a_convention_whose_text_is_gone_is_an_error():
-    definition_stages()
+    definition_operations()
     with pytest.raises(ValueError, match=r"0 places in masked_ssim\.blurred, where 1 is expected: 'no such text'"):
         prepared(Convention("nothing", (("masked_ssim.blurred", "no such text", ""),)))
 

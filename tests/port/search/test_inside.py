@@ -11,9 +11,9 @@ from endotsr.port.judge.npy import write_npy
 from endotsr.port.judge.report import as_table
 from endotsr.port.judge.store import in_precision
 from endotsr.port.judge.verdict import judge
+from endotsr.port.operations.definition import definition_operations
 from endotsr.port.search.find import explain
 from endotsr.port.search.inside import INSIDE, values
-from endotsr.port.stages.definition import definition_stages
 
 ROOT = Path(__file__).parents[3]
 
@@ -87,12 +87,12 @@ def test_a_right_port_is_told_nothing(golden, tmp_path):
 def test_every_array_is_computed_in_some_case_and_stands_in_the_guide(golden):
     guide = (ROOT / "docs" / "guides" / "port.md").read_text(encoding="utf-8")
     rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", guide.split("(guide-port-inside)=")[1], re.M))
-    stages = definition_stages()
+    operations = definition_operations()
     for operation, names in INSIDE.items():
         found = set()
         for case in cases_of(golden, operation):
             one = _Given(in_precision(golden.inputs(case), "float64"), case.settings)
-            found |= values(stages[operation], one).keys()
+            found |= values(operations[operation], one).keys()
         assert found == names.keys(), operation
         told = set(re.findall(r"`(\w+)`", rows[operation]))
         if operation == "render":
@@ -104,5 +104,5 @@ class _Given:
     def __init__(self, inputs, settings):
         self.inputs, self.settings = inputs, settings
 
-    def forward(self, stage, inputs, settings):
-        return stage.forward(inputs, settings)
+    def forward(self, operation, inputs, settings):
+        return operation.forward(inputs, settings)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from endotsr.port.operations.definition import definition_operations
 from endotsr.port.search import inside
 from endotsr.port.search.decisions import Interval, said, threshold
 from endotsr.port.search.find import sentences
@@ -18,9 +19,8 @@ from endotsr.port.search.places import Statement, spots, syntax, written
 from endotsr.port.search.rewrites import rewrites
 from endotsr.port.search.second import Counter
 from endotsr.port.search.trial import Hit
-from endotsr.port.stages.definition import definition_stages
 
-STAGES = definition_stages()
+OPERATIONS = definition_operations()
 
 
 def place(module, function):
@@ -111,11 +111,11 @@ def test_changes_that_explain_another_part_are_not_called_equal():
 def test_only_arrays_before_the_first_wrong_one_are_said_to_be_right_before_it(monkeypatch):
     arrays = {name: np.arange(6.0) + k for k, name in enumerate(("first", "second", "third"))}
     got = {**arrays, "second": arrays["second"] * 2 + np.sin(np.arange(6.0))}
-    monkeypatch.setattr(inside, "values", lambda stage, one: arrays)
+    monkeypatch.setattr(inside, "values", lambda operation, one: arrays)
     monkeypatch.setattr(inside, "read_plain", lambda path, root, most: got[path.stem])
     one: Any = SimpleNamespace(folder=Path("a"), case=SimpleNamespace(name="a/b"), tolerance=1e-9, inputs={})
-    stage: Any = None
-    (line,) = bisected(stage, one)
+    operation: Any = None
+    (line,) = bisected(operation, one)
     assert line.startswith("inside a/b the first wrong array is second: ") and line.endswith("; right before it: first")
 
 

@@ -20,10 +20,10 @@ from endotsr.port.judge.diagnose import PARTS, made_of
 from endotsr.port.judge.npy import write_npy
 from endotsr.port.judge.store import in_precision
 from endotsr.port.judge.verdict import judge
+from endotsr.port.operations.definition import definition_operations
 from endotsr.port.reference import stored
 from endotsr.port.search.find import explained, sentences
 from endotsr.port.search.places import executed
-from endotsr.port.stages.definition import definition_stages
 
 
 def causes(golden, folder, operation, *, inputs=lambda found: found, settings=lambda found: found, seconds=24.0):
@@ -31,7 +31,7 @@ def causes(golden, folder, operation, *, inputs=lambda found: found, settings=la
     for case in cases_of(golden, operation):
         given = inputs(in_precision(golden.inputs(case), "float64"))
         with np.errstate(all="ignore"):
-            found = definition_stages()[operation].compute(given, settings(case.settings))
+            found = definition_operations()[operation].compute(given, settings(case.settings))
         for name in case.outputs:
             write_npy(folder / case.name / f"{name}.npy", stored(found[name]))
     return report(golden, folder, operation, seconds)
@@ -134,7 +134,7 @@ def test_an_input_in_another_order_is_found(golden, tmp_path):
     folder = tmp_path / "turned"
     for case in cases_of(golden, "covariance"):
         given = in_precision(golden.inputs(case), "float64")
-        found = definition_stages()["covariance"].compute({**given, "quaternion": given["quaternion"][order]}, {})
+        found = definition_operations()["covariance"].compute({**given, "quaternion": given["quaternion"][order]}, {})
         found["d_quaternion"] = found["d_quaternion"][np.argsort(order)]
         for name in case.outputs:
             write_npy(folder / case.name / f"{name}.npy", stored(found[name]))
@@ -236,16 +236,18 @@ def test_the_definition_is_as_before(golden, tmp_path, monkeypatch):
 
 
 def test_the_parts_of_an_operation_are_those_that_the_definition_calls(golden):
-    stages = definition_stages()
+    operations = definition_operations()
     parts = {}
-    for name, stage in stages.items():
+    for name, operation in operations.items():
         case = cases_of(golden, name)[0]
         given = in_precision(golden.inputs(case), "float64")
         with np.errstate(all="ignore"):
-            places = executed({"forward": lambda g=given, s=stage, c=case: s.compute(g, c.settings)})
+            places = executed({"forward": lambda g=given, s=operation, c=case: s.compute(g, c.settings)})
         parts[name] = {place.name for place in places if not place.is_constant}
-    own = {name: f"{s.function.split('.')[-2]}.{s.function.rpartition('.')[2]}" for name, s in stages.items()}
+    own = {name: f"{s.function.split('.')[-2]}.{s.function.rpartition('.')[2]}" for name, s in operations.items()}
     for name in PARTS.keys() & parts.keys():
-        assert {part for part in stages if part != name and own[part] in parts[name]} - {"frequencies"} <= made_of(name)
+        assert {part for part in operations if part != name and own[part] in parts[name]} - {"frequencies"} <= made_of(
+            name
+        )
         for part in set(PARTS[name]) & parts.keys() - {"exposure", "calibration"}:
             assert own[part] in parts[name], (name, part)

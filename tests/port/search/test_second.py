@@ -145,8 +145,8 @@ FAMILIES = {
 @pytest.mark.parametrize("kind", MISTAKES)
 def test_every_kind_of_change_finds_a_mistake(golden, tmp_path, kind, monkeypatch):
     monkeypatch.setattr(changes, "try_conventions", lambda *_: None)  # one of them is a mistake of this table
-    stage, old, new, said = MISTAKES[kind]
-    found = search_on(golden, tmp_path, stage, (old, new))
+    operation, old, new, said = MISTAKES[kind]
+    found = search_on(golden, tmp_path, operation, (old, new))
     text = "\n".join(sentences(found))
     known = (said,) if isinstance(said, str) else said  # exact words; changes that do the same are found in any order
     assert any(one in text for one in known) and f"(every output of its {len(found.cases)} cases)" in text
@@ -154,13 +154,13 @@ def test_every_kind_of_change_finds_a_mistake(golden, tmp_path, kind, monkeypatc
 
 @pytest.mark.parametrize("kind", FAMILIES)
 def test_every_family_of_changes_finds_a_mistake(golden, tmp_path, kind):
-    stage, edits, said = FAMILIES[kind]
-    text = "\n".join(sentences(search_on(golden, tmp_path, stage, *edits)))
+    operation, edits, said = FAMILIES[kind]
+    text = "\n".join(sentences(search_on(golden, tmp_path, operation, *edits)))
     assert said in text and "(every output of its " in text
 
 
 def test_an_output_that_the_definition_computes_with_too_few_digits_is_not_compared(golden, tmp_path, monkeypatch):
-    monkeypatch.setattr(find, "search", lambda stage, answered, *_: answered)
+    monkeypatch.setattr(find, "search", lambda operation, answered, *_: answered)
     edit = ('"d_translation": g_d - w @ g_centre', '"d_translation": g_d + w @ g_centre')
     compared: Any = {one.case.name: one.got.keys() for one in search_on(golden, tmp_path, "render", edit)}
     assert "colour_image" in compared["render/needle"]
@@ -216,15 +216,15 @@ def test_none_of_them_is_in_the_independent_set():
 
 
 def test_a_change_cannot_write_into_what_the_next_one_starts_from(golden, tmp_path):
-    stage, old, new, _ = MISTAKES["a factor at one index"]
-    one = search_on(golden, tmp_path, stage, (old, new)).cases[0]
+    operation, old, new, _ = MISTAKES["a factor at one index"]
+    one = search_on(golden, tmp_path, operation, (old, new)).cases[0]
     with pytest.raises(ValueError, match="read-only"):
         one.saved[0].quaternion[0] = 1
-    right = one.reverse(_stage(stage), one.inputs, one.saved)
+    right = one.reverse(_operation(operation), one.inputs, one.saved)
     assert all((right[name] == one.right[name]).all() for name in right)
 
 
-def _stage(name):
-    from endotsr.port.stages.definition import definition_stages
+def _operation(name):
+    from endotsr.port.operations.definition import definition_operations
 
-    return definition_stages()[name]
+    return definition_operations()[name]

@@ -20,8 +20,8 @@ from endotsr.port.judge.npy import npy_bytes
 from endotsr.port.judge.schemas import SCHEMAS
 from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.judge.words import fnv1a, words
+from endotsr.port.operations.requests import raster_of
 from endotsr.port.reference import reference
-from endotsr.port.stages.requests import raster_of
 from makers import generate
 from makers.generate import all_specs, check, moved, solve_all, solve_these
 from makers.making import single

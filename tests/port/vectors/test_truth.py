@@ -6,12 +6,12 @@ import pytest
 import endotsr.definition as definition
 from endotsr.port.judge.compare import judged, largest
 from endotsr.port.judge.store import golden_folder, read_golden
-from endotsr.port.stages.definition import definition_stages
+from endotsr.port.operations.definition import definition_operations
 from makers.registry import JUDGED
 from oracle import adam, fourier_oracle, matern_oracle, pose_oracle
 
 GOLDEN = read_golden(golden_folder())
-TWINS = definition_stages()
+TWINS = definition_operations()
 NO_TWIN = {"generator", "reading", "determinism"}  # how files are read, and the same bits twice
 LONG_NEEDLE = "render/long_needle"  # the inverse of Sigma loses (length / width)^2 roundings: this much of the scale
 LOST = {"d_log_scale": 1e-5}

@@ -1,6 +1,6 @@
-"""The terms of the objective, each from its own module: the stage whose functions are in `my_term` or `masked_my_term`.
+"""The terms of the objective: each is the operation whose functions are in the module `my_term` or `masked_my_term`.
 
-A term is a field of `LossWeights`. What its stage reads has the names of the golden cases.
+A term is a field of `LossWeights`. What its operation reads has the names of the golden cases.
 """
 
 import msgspec
@@ -9,7 +9,7 @@ import pytest
 
 from endotsr.config import PAPER
 from endotsr.method.equations.laplacian import LEVELS
-from endotsr.port.stages.registry import all_stages
+from endotsr.port.operations.registry import method_operations
 from endotsr.training.fitting import objective
 from endotsr.training.fitting.objective import LossWeights
 
@@ -31,7 +31,7 @@ def forward_functions(term: str) -> list[str]:
 
 def alone(term: str, rendered, frame, cotangent: float = 1.0):
     """Value of a term, and its gradients by colour and by depth times the cotangent; 0 for a gradient that it lacks."""
-    (stage,) = [one for one in all_stages().values() if is_of(one.function.rpartition(".")[0], term)]
+    (operation,) = [one for one in method_operations().values() if is_of(one.function.rpartition(".")[0], term)]
     inputs = {
         "rendered": rendered.colour,
         "rendered_depth": rendered.depth,
@@ -41,10 +41,10 @@ def alone(term: str, rendered, frame, cotangent: float = 1.0):
         "edges": objective.canny_edges(rendered.depth),
     }
     try:
-        outputs, saved = stage.forward(inputs, SETTINGS)
+        outputs, saved = operation.forward(inputs, SETTINGS)
     except KeyError as error:
-        pytest.fail(f"the stage of {term} reads {error}: add it to the inputs in tests/training/fitting/terms.py")
+        pytest.fail(f"the operation of {term} reads {error}: add it to the inputs in tests/training/fitting/terms.py")
     ((name, value),) = outputs.items()
-    back = stage.reverse({name: np.array(cotangent)}, saved)
+    back = operation.reverse({name: np.array(cotangent)}, saved)
     assert back.keys() <= {"d_rendered", "d_rendered_depth"}
     return value, back.get("d_rendered", 0), back.get("d_rendered_depth", 0)

@@ -1,4 +1,4 @@
-"""The public gradient checker, and every variant of every stage as a forward/reverse pair.
+"""The public gradient checker, and every variant of every operation as a forward/reverse pair.
 
 One call checks a port: `check_function(forward, reverse, inputs)` returns a `PairReport`.
 """

@@ -28,7 +28,7 @@ def run_gradcheck(
     pairs = definition_pairs() if definition else all_pairs()
     for name in names or ():
         if name not in pairs:
-            raise InputError(f"gradcheck: {name!r} is not a registered stage; use {choice(pairs)}")
+            raise InputError(f"gradcheck: {name!r} is not a registered operation; use {choice(pairs)}")
     refuse_unwritable(json_path)
     chosen = [pairs[name] for name in (names or pairs)]
     reports, precisions = [], []

@@ -1,6 +1,6 @@
-"""Every variant of every stage as a forward/reverse pair, for the gradient checks and the tables.
+"""Every variant of every operation as a forward/reverse pair, for the gradient checks and the tables.
 
-`tests/test_conventions.py` asserts that `all_pairs` includes every `<stage>_forward` of the package.
+`tests/test_conventions.py` asserts that `all_pairs` includes every `<operation>_forward` of the package.
 """
 
 import contextlib
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-from endotsr.port.stages.stage import Stage, Variant, real_of
+from endotsr.port.operations.operation import Operation, Variant, real_of
 
 Arrays = Mapping[str, NDArray]
 
@@ -19,7 +19,7 @@ Arrays = Mapping[str, NDArray]
 class Pair(NamedTuple):
     """One forward pass and its reverse pass, with the signatures expected by the checker.
 
-    name      variant of a stage, or any name for a custom pair
+    name      variant of an operation, or any name for a custom pair
     equation  the equation label of the specification ("1" ... "7" for the paper, "B..." for the base model)
     inputs    rng -> float64 arrays, all differentiable, non-vacuous and away from kinks
     forward   inputs -> outputs, by name; float arrays (a scalar loss is an array of shape ())
@@ -47,38 +47,38 @@ class Pair(NamedTuple):
     traced: Callable[[Arrays], tuple[Mapping[str, NDArray], Mapping[str, NDArray]]] | None = None
 
 
-def pair_of(stage: Stage, variant: Variant) -> Pair:
-    """The stage with the settings and the fixed inputs of one of its variants.
+def pair_of(operation: Operation, variant: Variant) -> Pair:
+    """The operation with the settings and the fixed inputs of one of its variants.
 
-    Raises: ValueError for a stage without a reverse pass.
+    Raises: ValueError for an operation without a reverse pass.
     """
-    reverse_pass, trace_pass = stage.reverse, stage.trace
+    reverse_pass, trace_pass = operation.reverse, operation.trace
     if reverse_pass is None:
-        raise ValueError(f"stage {stage.name} has no reverse pass that variant {variant.name} could check")
+        raise ValueError(f"operation {operation.name} has no reverse pass that variant {variant.name} could check")
 
     def whole(inputs: Arrays) -> Arrays:
         return inputs if variant.fixed is None else {**inputs, **variant.fixed(real_of(inputs))}
 
     def forward(inputs: Arrays) -> dict[str, NDArray]:
-        outputs, _ = stage.forward(whole(inputs), variant.settings)
+        outputs, _ = operation.forward(whole(inputs), variant.settings)
         return {name: np.asarray(value) for name, value in outputs.items()}
 
     def traced(inputs: Arrays) -> tuple[dict[str, NDArray], Mapping[str, NDArray]]:
         assert trace_pass is not None
         everything = whole(inputs)
-        outputs, saved = stage.forward(everything, variant.settings)
+        outputs, saved = operation.forward(everything, variant.settings)
         found = {name: np.asarray(value) for name, value in outputs.items()}
         return found, trace_pass(everything, variant.settings, saved)
 
     def reverse(inputs: Arrays, cotangents: Arrays) -> dict[str, NDArray]:
-        _, saved = stage.forward(whole(inputs), variant.settings)
+        _, saved = operation.forward(whole(inputs), variant.settings)
         found = reverse_pass(cotangents, saved)
         return {name: np.asarray(found[f"d_{name}"]) for name in inputs}
 
     return Pair(
         variant.name,
-        stage.equation,
-        variant.function or stage.function,
+        operation.equation,
+        variant.function or operation.function,
         variant.inputs,
         forward,
         reverse,
@@ -91,18 +91,24 @@ def pair_of(stage: Stage, variant: Variant) -> Pair:
 
 
 def all_pairs() -> dict[str, Pair]:
-    """Every variant of every stage by name, in the order of the specification."""
-    from endotsr.port.stages.registry import all_stages
+    """Every variant of every operation by name, in the order of the specification."""
+    from endotsr.port.operations.registry import method_operations
 
-    return {variant.name: pair_of(stage, variant) for stage in all_stages().values() for variant in stage.variants}
+    return {
+        variant.name: pair_of(operation, variant)
+        for operation in method_operations().values()
+        for variant in operation.variants
+    }
 
 
 def definition_pairs() -> dict[str, Pair]:
     """The same pairs with the functions of `endotsr.definition`, without duplicates."""
-    from endotsr.port.stages.definition import definition_stages
+    from endotsr.port.operations.definition import definition_operations
 
     return {
-        variant.name: pair_of(stage, variant) for stage in definition_stages().values() for variant in stage.variants
+        variant.name: pair_of(operation, variant)
+        for operation in definition_operations().values()
+        for variant in operation.variants
     }
 
 

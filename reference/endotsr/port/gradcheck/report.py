@@ -9,7 +9,7 @@ from endotsr.port.gradcheck.checker import BlockReport, PairReport
 from endotsr.port.gradcheck.precision import PrecisionReport
 from endotsr.results.report.tables import plain
 
-HEADER = ("stage", "equation", "block", "probes", "refused", "unresolved", "worst rel. error", "step", "verdict")
+HEADER = ("operation", "equation", "block", "probes", "refused", "unresolved", "worst rel. error", "step", "verdict")
 _LEFT = (0, 1, 2, 8)
 _COLOURS = {"ok": "\x1b[32m", "skipped": "\x1b[33m"}
 _RED, _RESET = "\x1b[31m", "\x1b[0m"

@@ -16,8 +16,8 @@ from endotsr.untrusted.names import file_name, plain_line, relative_path
 Level = Literal[0, 1, 2, 3, 4, 5]
 LEVELS = {
     0: "reading",
-    1: "stages, forward",
-    2: "stages, reverse",
+    1: "operations, forward",
+    2: "operations, reverse",
     3: "render and full loss with every gradient",
     4: "a training trajectory",
     5: "determinism",

@@ -62,7 +62,7 @@ PROFILES = {
     ),
     "method": Profile(
         "method", _METHOD,
-        {1: "every stage forward, and the decisions of training", 2: "every stage, forward and reverse",
+        {1: "every operation forward, and the decisions of training", 2: "every operation, forward and reverse",
          3: "renders and the whole objective with every gradient"},
     ),
     "training": Profile(

@@ -31,7 +31,7 @@ def main(words: list[str]) -> int:
         found = explained(golden, Path(outputs), given, int(level), operation, float(seconds))
     except InputError:
         return 1
-    inside, asked = looked(found.stage, found.cases)
+    inside, asked = looked(found.operation, found.cases)
     whole = sentences(found)
     began, more = time.process_time(), float(seconds) / 2  # for both that follow
     causes = together(found, more / 2)

@@ -16,9 +16,9 @@ from endotsr.port.judge.npy import Refused, read_plain
 from endotsr.port.judge.records import CaseReport
 from endotsr.port.judge.relate import FITS
 from endotsr.port.judge.store import Golden, in_precision
+from endotsr.port.operations.definition import definition_operations
+from endotsr.port.operations.operation import Inputs, Operation, Outputs, Settings, tidy
 from endotsr.port.search.places import executed
-from endotsr.port.stages.definition import definition_stages
-from endotsr.port.stages.stage import Inputs, Outputs, Settings, Stage, tidy
 
 AFTER = 2  # compared iterations of a trajectory from its first wrong one on; those before it are compared too
 PIECE = 1e-6  # step length of a derivative, in units of the input
@@ -76,18 +76,18 @@ class Answered:
         """The compared iterations of an array with one entry per iteration; other arrays unchanged."""
         return array[: self.length] if self.length and axes_of(name, array.ndim) == "iteration" else array
 
-    def keep_reproduced(self, stage: Stage) -> None:
+    def keep_reproduced(self, operation: Operation) -> None:
         """Compare only outputs that the definition computes as the vectors have them; of a needle it loses digits."""
-        self.begin(stage)
+        self.begin(operation)
         got, self.got = self.got, self.expected
         self.got = {name: array for name, array in got.items() if self.same(self.right, [name])}
         self.refused &= self.got.keys()
 
-    def begin(self, stage: Stage) -> None:
+    def begin(self, operation: Operation) -> None:
         """Compute the right outputs, and separate forward outputs from gradients."""
-        forward, self.saved = self.forward(stage, self.inputs, self.settings)
+        forward, self.saved = self.forward(operation, self.inputs, self.settings)
         _lock(self.saved)
-        self.right = {**forward, **self.reverse(stage, self.inputs, self.saved)}
+        self.right = {**forward, **self.reverse(operation, self.inputs, self.saved)}
         self.forward_names = [name for name in self.got if name in forward]
         self.gradient_names = [name for name in self.got if name not in forward]
 
@@ -98,27 +98,29 @@ class Answered:
         one.refused = self.refused & {name}
         return one
 
-    def beside(self, stage: Stage) -> "Answered":
+    def beside(self, operation: Operation) -> "Answered":
         """The same case against the definition as it stands now, with a first change: what that explains is right."""
         one = copy(self)
-        one.begin(stage)
+        one.begin(operation)
         one.refused = {name for name in one.got if not one.same(one.right, [name])}
         return one
 
-    def forward(self, stage: Stage, inputs: Inputs, settings: Settings) -> tuple[Outputs, Any]:
+    def forward(self, operation: Operation, inputs: Inputs, settings: Settings) -> tuple[Outputs, Any]:
         """Outputs without gradients, and the saved tuple of the reverse pass."""
-        found, saved = stage.forward(inputs, settings)
-        more = {} if stage.extra is None else stage.extra(inputs, settings, saved)
+        found, saved = operation.forward(inputs, settings)
+        more = {} if operation.extra is None else operation.extra(inputs, settings, saved)
         kept = {name: self._short(name, array) for name, array in tidy({**found, **more}).items()}
         return kept, (saved, tuple(found))
 
-    def reverse(self, stage: Stage, inputs: Inputs, saved: Any) -> Outputs:
+    def reverse(self, operation: Operation, inputs: Inputs, saved: Any) -> Outputs:
         """Gradients, if the case requests them."""
         own, names = saved
         given = {name: inputs[f"d_{name}"] for name in names if f"d_{name}" in inputs}
-        if stage.is_loss:
+        if operation.is_loss:
             given = dict.fromkeys(names, np.array(1.0)) | given
-        return tidy(stage.reverse(given, own)) if stage.reverse is not None and given.keys() == set(names) else {}
+        return (
+            tidy(operation.reverse(given, own)) if operation.reverse is not None and given.keys() == set(names) else {}
+        )
 
     def same(self, found: Mapping[str, NDArray], names: Sequence[str] | set[str]) -> bool:
         """Whether all of these outputs equal the port's, within rounding and the allowed flips."""
@@ -163,7 +165,7 @@ class Answered:
         joined = np.concatenate(parts) if parts else np.zeros(0)
         return joined if np.isfinite(joined).all() else None
 
-    def is_derivative(self, stage: Stage) -> bool | None:
+    def is_derivative(self, operation: Operation) -> bool | None:
         """Whether the port's gradients are the derivatives of the current forward pass, along one line.
 
         None: undecidable here
@@ -178,7 +180,7 @@ class Answered:
             return None
         for sign in (1, -1):
             moved = {**self.inputs, **{name: self.inputs[name] + sign * PIECE * along[name] for name in names}}
-            found, _ = stage.forward(moved, self.settings)
+            found, _ = operation.forward(moved, self.settings)
             values.append(sum((np.asarray(self.inputs.get(f"d_{n}", 1.0)) * found[n]).sum() for n in found))
         parts = [float((self.got[f"d_{name}"] * along[name]).sum()) for name in names]
         size = float(np.abs([(np.abs(self.got[f"d_{n}"] * along[n])).sum() for n in names]).sum())
@@ -197,11 +199,11 @@ def _lock(value: Any) -> None:
 
 def of_the_parts(operation: str, golden: Golden) -> set[str]:
     """Functions of the definition that the parts of an operation execute, each part in its last case."""
-    stages = definition_stages()
-    parts = made_of(operation) & stages.keys()
+    operations = definition_operations()
+    parts = made_of(operation) & operations.keys()
     cases = {case.operation: case for case in golden.cases if case.operation in parts}
     calls = {
-        part: lambda part=part: stages[part].compute(
+        part: lambda part=part: operations[part].compute(
             in_precision(golden.inputs(cases[part]), "float64"), cases[part].settings
         )
         for part in parts & cases.keys()

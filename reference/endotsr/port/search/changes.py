@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.port.judge.store import Golden
+from endotsr.port.operations.operation import Operation, Outputs
 from endotsr.port.search.cases import Answered, of_the_parts
 from endotsr.port.search.conventions import together
 from endotsr.port.search.decisions import try_conventions, try_thresholds
@@ -33,7 +34,7 @@ from endotsr.port.search.second import (
     beside,
     expressions,
     in_both,
-    in_stages,
+    in_operations,
     mean_of_means,
     orders,
     pairs,
@@ -41,7 +42,6 @@ from endotsr.port.search.second import (
     turned,
 )
 from endotsr.port.search.trial import LATEST, TELLING, UNREACHED, Live, Trial, installed
-from endotsr.port.stages.stage import Outputs, Stage
 
 SECONDS = 16.0  # computing time of a search; `find` gives a trajectory more
 UNKNOWN = 1  # assumed number of outputs spoiled by a change of an expression, if unknown
@@ -51,19 +51,19 @@ MOST_BESIDE = 6  # readings of a setting or an input that leave a wrong output a
 MOST_VALUES = 64  # examined values of an expression
 
 
-def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: float = SECONDS) -> Trial:
+def search(operation: Operation, answered: Sequence[Answered], golden: Golden, seconds: float = SECONDS) -> Trial:
     """Changes of one operation that explain the port's outputs, best first in `hits`."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        found = Trial(stage, answered, golden, seconds)
+        found = Trial(operation, answered, golden, seconds)
         calls: dict[str, Callable[[], Any]] = {
-            "forward": lambda: [one.forward(stage, one.inputs, one.settings) for one in answered],
-            "reverse": lambda: [one.reverse(stage, one.inputs, one.saved) for one in answered],
+            "forward": lambda: [one.forward(operation, one.inputs, one.settings) for one in answered],
+            "reverse": lambda: [one.reverse(operation, one.inputs, one.saved) for one in answered],
         }
         places = executed(calls)
         for module in definition_modules():
             module.__dict__.update(_at=at, _nth=found.counter.nth, _mean_of_means=mean_of_means)
-        inner = of_the_parts(stage.name, golden)
+        inner = of_the_parts(operation.name, golden)
         glue = [place for place in places if inner and not place.is_constant and place.name not in inner]
         if not found.length:
             try_conventions(found, places)
@@ -305,7 +305,7 @@ def _forms(trial: Trial, places: Sequence[Statement], live: Sequence[Live]) -> N
         of = [one for one in live if one.spot.place is place]
         if not trial.explains:
             _changes(trial, alike([(one.spot, one.values) for one in of]))
-            _changes(trial, (change for one in of for change in in_stages(one.spot, names_in(place))))
+            _changes(trial, (change for one in of for change in in_operations(one.spot, names_in(place))))
 
 
 def _second(trial: Trial, places: Sequence[Statement]) -> None:

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.port.operations.operation import Outputs
 from endotsr.port.search.conventions import prepared
 from endotsr.port.search.images import OF_IMAGES
 from endotsr.port.search.places import Spot, Statement, spots, written
 from endotsr.port.search.requests import OtherReading, other_requests
 from endotsr.port.search.screen import OF_THE_SCREEN
 from endotsr.port.search.trial import Trial, installed
-from endotsr.port.stages.stage import Outputs
 
 SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
 FIRST = (0.0, 0.5, 2.0, 1e6)  # factors tried first; if none changes the number of wrong entries, no other is tried

@@ -13,10 +13,10 @@ from endotsr.port.judge.format import Precision
 from endotsr.port.judge.records import Report
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import INSIDE, judge, left_out
+from endotsr.port.operations.definition import definition_operations
 from endotsr.port.search.cases import Answered
 from endotsr.port.search.changes import SECONDS, search
 from endotsr.port.search.trial import Hit, Trial
-from endotsr.port.stages.definition import definition_stages
 from endotsr.untrusted.names import counted
 
 START_UP = 60.0  # seconds of a process outside its search
@@ -26,25 +26,25 @@ MOST_LINES = 3  # listed source lines, and functions with such lines beyond whic
 MOST_APART = 6  # outputs that are explained one at a time
 
 
-def explained(golden: Golden, outputs: Path, precision: Precision, level: int, operation: str, seconds: float) -> Trial:
+def explained(golden: Golden, outputs: Path, precision: Precision, level: int, name: str, seconds: float) -> Trial:
     """The search for the mistake of an operation with a refused output.
 
     Raises: InputError if the definition does not compute the operation, or none of its refused outputs can be compared:
     one may be unreadable, of another shape, or asked only to equal another output.
     """
-    stage = definition_stages().get(operation)
-    if stage is None:
-        raise InputError(f"{operation}: not computed by the definition")
-    cases = [case for case in golden.cases if case.operation == operation and case.level <= level]
+    operation = definition_operations().get(name)
+    if operation is None:
+        raise InputError(f"{name}: not computed by the definition")
+    cases = [case for case in golden.cases if case.operation == name and case.level <= level]
     reports = judge(golden._replace(cases=cases), outputs, precision, level=min(level, 4)).cases
     answered = [Answered(golden, *pair, outputs, precision) for pair in zip(cases, reports)]
     for one in answered:
-        one.keep_reproduced(stage)
+        one.keep_reproduced(operation)
     answered = [one for one in answered if one.got]
     answered.sort(key=_order)
     if not answered or not answered[0].refused:
-        raise InputError(f"{operation}: nothing to explain")
-    return search(stage, answered, golden, seconds * (LONG if answered[0].length else 1))
+        raise InputError(f"{name}: nothing to explain")
+    return search(operation, answered, golden, seconds * (LONG if answered[0].length else 1))
 
 
 def together(trial: Trial, seconds: float) -> list[str]:
@@ -58,8 +58,8 @@ def together(trial: Trial, seconds: float) -> list[str]:
     if first.whole != "forward" and (first.whole != "most" or trial.discrete):
         return []  # many changes give the decisions of the one case that is left
     with first.standing():
-        beside = sorted((one.beside(trial.stage) for one in trial.cases), key=_order)
-        second = search(trial.stage, beside, trial.golden, seconds) if beside[0].refused else None
+        beside = sorted((one.beside(trial.operation) for one in trial.cases), key=_order)
+        second = search(trial.operation, beside, trial.golden, seconds) if beside[0].refused else None
     said = _equally(second) if second and second.hits and second.hits[0].whole == "all" else []
     if not said:
         return []
@@ -90,7 +90,7 @@ def apart(trial: Trial, whole: Sequence[str], seconds: float) -> list[str]:
     for k, name in enumerate(tried):
         cases = sorted((one.alone(name, names) for one in trial.cases), key=_order)
         budget = (end - time.process_time()) / (len(tried) - k)
-        lines = _equally(search(trial.stage, cases, trial.golden, budget))
+        lines = _equally(search(trial.operation, cases, trial.golden, budget))
         for line in lines[:1]:
             found.setdefault(line, []).append(name)
     return [f"{', '.join(outputs)} alone: as in the definition with {line}" for line, outputs in found.items()]

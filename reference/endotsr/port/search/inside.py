@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from endotsr.port.judge.npy import Refused, read_plain
 from endotsr.port.judge.relate import FITS, relations
+from endotsr.port.operations.operation import Operation
 from endotsr.port.search.cases import Answered
-from endotsr.port.stages.stage import Stage
 
 FOLDER = "inside"
 MOST_BYTES = 1 << 27
@@ -105,9 +105,9 @@ INSIDE: dict[str, dict[str, Inner]] = {
 """Arrays by operation and name, in the order of computation of the definition."""
 
 
-def values(stage: Stage, one: Answered) -> dict[str, NDArray]:
+def values(operation: Operation, one: Answered) -> dict[str, NDArray]:
     """The arrays of a case, from the first call of each function; arrays that the case does not reach are omitted."""
-    wanted = INSIDE.get(stage.name, {})
+    wanted = INSIDE.get(operation.name, {})
     functions = {_code(inner.function): inner.function for inner in wanted.values()}
     names: dict[str, Mapping[str, Any]] = {}
 
@@ -119,7 +119,7 @@ def values(stage: Stage, one: Answered) -> dict[str, NDArray]:
     before = sys.getprofile()
     sys.setprofile(seen)
     try:
-        one.forward(stage, one.inputs, one.settings)
+        one.forward(operation, one.inputs, one.settings)
     finally:
         sys.setprofile(before)
     found = {}
@@ -134,9 +134,9 @@ def _code(function: str) -> Any:
     return getattr(importlib.import_module(f"endotsr.definition.{module}"), name).__code__
 
 
-def bisected(stage: Stage, one: Answered) -> list[str]:
+def bisected(operation: Operation, one: Answered) -> list[str]:
     """A sentence on the arrays that a port wrote for a case; empty if it wrote none."""
-    expected, right, wrong = values(stage, one), [], []
+    expected, right, wrong = values(operation, one), [], []
     for name, array in expected.items():
         try:
             got = read_plain(one.folder / FOLDER / f"{name}.npy", one.folder, MOST_BYTES)
@@ -168,21 +168,21 @@ def compared(got: NDArray, array: NDArray, tolerance: float, others: Mapping[str
     return "; ".join(one.text for one in relations(got, array, "max", allowed, rest)[:2])
 
 
-def asked(stage: Stage, one: Answered) -> str:
+def asked(operation: Operation, one: Answered) -> str:
     """The arrays that a port may write for a case, "" if there are none."""
-    names = values(stage, one)
+    names = values(operation, one)
     if not names:
         return ""
     shapes = ", ".join(f"{name} {array.shape}" for name, array in names.items())
     return f"to look inside {one.case.name}, write any of these into {one.case.name}/{FOLDER}/: {shapes}"
 
 
-def looked(stage: Stage, cases: Sequence[Answered]) -> tuple[list[str], str]:
+def looked(operation: Operation, cases: Sequence[Answered]) -> tuple[list[str], str]:
     """A sentence on the arrays of one refused case, one with a wrong array if there is any.
 
     Without arrays of the port it is empty; then the second text names those that the port may write.
     """
     refused = [one for one in cases if one.refused]
-    said = [found for one in refused if (found := bisected(stage, one))]
+    said = [found for one in refused if (found := bisected(operation, one))]
     said.sort(key=lambda found: " wrong " not in found[0])
-    return (said[0], "") if said else ([], asked(stage, refused[0]))
+    return (said[0], "") if said else ([], asked(operation, refused[0]))

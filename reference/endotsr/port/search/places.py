@@ -1,4 +1,4 @@
-"""Places in the source of the definition: the code executed by a stage, and its execution with one place changed."""
+"""Places in the source of the definition: the code that an operation executes, and its run with one place changed."""
 
 import ast
 import inspect

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.port.judge.format import Case
-from endotsr.port.stages.stage import Inputs, Outputs, Settings
+from endotsr.port.operations.operation import Inputs, Outputs, Settings
 
 MOST_ORDERED = 4  # longest axis with every order tried
 MOST_SWAPPED = 16  # longest axis with the exchange of every pair tried

@@ -145,7 +145,7 @@ def _form(node: ast.AST) -> str:
     return ast.dump(found)
 
 
-def in_stages(spot: Spot, names: Sequence[str]) -> Iterator[SecondChange]:
+def in_operations(spot: Spot, names: Sequence[str]) -> Iterator[SecondChange]:
     """A sum divided by a count as the mean along one axis of the means there, over the entries of a mask.
 
     names   those of the function; a mask is an array of booleans among them

@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from endotsr.port.judge.store import Golden
+from endotsr.port.operations.operation import Operation, Outputs
 from endotsr.port.search.cases import Answered
 from endotsr.port.search.numbers import START, best_number, plain_first
 from endotsr.port.search.places import Spot, Statement
 from endotsr.port.search.requests import OtherReading
 from endotsr.port.search.second import Counter
-from endotsr.port.stages.stage import Outputs, Stage
 
 LATEST = 1000  # rank of a spot with unknown reach
 UNREACHED = 1001  # rank of a spot at which a small change leaves a wrong output as it is
@@ -66,8 +66,8 @@ class Live(NamedTuple):
 class Trial:
     """The search for one operation: its cases, in the order of `find.explained`, and the hits."""
 
-    def __init__(self, stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: float) -> None:
-        self.stage, self.cases, self.end = stage, answered, time.process_time() + seconds
+    def __init__(self, operation: Operation, answered: Sequence[Answered], golden: Golden, seconds: float) -> None:
+        self.operation, self.cases, self.end = operation, answered, time.process_time() + seconds
         self.golden = golden
         self.length = max((one.length for one in answered), default=0)  # of trajectories, which are slow
         self.hits: list[Hit] = []
@@ -78,7 +78,7 @@ class Trial:
         self.unlike = ""  # the refused case that the last change does not explain, if it explains the others
         self.matched = False  # the last change reproduces the forward outputs of a case with a refused one
         for one in answered:
-            one.begin(stage)
+            one.begin(operation)
         most = answered[0]
         self.lower = lower_precision(most)
         real = [name for name in sorted(most.refused) if most.case.outputs[name].dtype == "real"]
@@ -130,7 +130,7 @@ class Trial:
             found, saved = one.right, one.saved
             if mode != "reverse":
                 with installed(install):
-                    found, saved = one.forward(self.stage, inputs, settings)
+                    found, saved = one.forward(self.operation, inputs, settings)
             same = one.same(request.tell(found) if request else found, one.forward_names)
             if not same and one.refused:
                 if self.unlike or explained < MOST:
@@ -141,13 +141,13 @@ class Trial:
             self.matched |= same and bool(one.refused.intersection(one.forward_names))
             if same and one.gradient_names and False not in gradients and (one.refused or not gradients):
                 with installed(install if mode != "forward" else None):
-                    back = one.reverse(self.stage, inputs, saved)
+                    back = one.reverse(self.operation, inputs, saved)
                 same = one.same(request.tell(back) if request else back, one.gradient_names)
                 if not same and one.refused:
                     if mode == "reverse" or not self.forward_refused:
                         return ""
                     with installed(install):
-                        gradients.append(one.is_derivative(self.stage))
+                        gradients.append(one.is_derivative(self.operation))
             spoils = spoils or (not same and not one.refused)
         if self.unlike:
             return "" if gradients or spoils else "most"
@@ -174,9 +174,9 @@ class Trial:
         found, saved = one.right, one.saved
         if mode != "reverse":
             with installed(install):
-                found, saved = one.forward(self.stage, inputs, settings)
+                found, saved = one.forward(self.operation, inputs, settings)
         with installed(install if mode != "forward" else None):
-            return {**found, **one.reverse(self.stage, inputs, saved)}
+            return {**found, **one.reverse(self.operation, inputs, saved)}
 
     def number(self, at: Callable[[float], Outputs], rest: float) -> tuple[list[tuple[float, bool]], int]:
         """Numbers to try, as `plain_first` orders them, and the number of right outputs that a small step spoils.
@@ -201,9 +201,9 @@ class Trial:
     def reached(self, request: OtherReading) -> bool:
         """Whether a misreading changes the wrong outputs of the first case, in the pass that is to be explained."""
         one = self.cases[0]
-        forward, saved = one.forward(self.stage, *request.ask(one.inputs, one.settings))
+        forward, saved = one.forward(self.operation, *request.ask(one.inputs, one.settings))
         return self.reaches(
-            request.tell(forward if self.forward_refused else one.reverse(self.stage, one.inputs, saved))
+            request.tell(forward if self.forward_refused else one.reverse(self.operation, one.inputs, saved))
         )
 
     def reaches(self, found: Outputs) -> bool:

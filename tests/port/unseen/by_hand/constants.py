@@ -56,7 +56,7 @@ def constants() -> list[dict]:
 
 
 def refusing(golden, edits) -> list[str]:
-    """Names of the cases that refuse the port by hand with these edits. Cases outside its stages are not asked."""
+    """Names of the cases that refuse the port by hand with these edits. Cases outside its operations are not asked."""
     port, found = hand_port.operations(edits), []
     for case in golden.cases:
         if case.operation not in hand_port.OPERATIONS:

@@ -3,7 +3,7 @@
     python tests/port/unseen/by_hand/measure.py [ID ...] [--sample N] [--search SECONDS] [--jobs 2] [--said]
                                                         [--record NAME]
 
-The port by hand is run in float64 on all stages and on `render`, up to level 3. Each mistake has one outcome:
+The port by hand is run in float64 on all operations and on `render`, up to level 3. Each mistake has one outcome:
 
     explained a change of the definition is said with which it gives every output of the first wrong operation, in every
               case, as the port wrote it; or the words of the entry are in the change that is said
@@ -68,7 +68,7 @@ class Outcome(NamedTuple):
 
     id: str
     outcome: str
-    stage: bool  # whether the first wrong operation is that of the entry
+    operation: bool  # whether the first wrong operation is that of the entry
     said: str  # the first answer, in one line
 
 
@@ -138,18 +138,18 @@ def outcome_of(entry: dict, report: Report) -> Outcome:
         return Outcome(entry["id"], "passed", False, "")
     lines = report.diagnosis
     found = FIRST.search(lines[0]) if lines else None
-    stage = bool(found) and found[1] == entry["stage"]
+    operation = bool(found) and found[1] == entry["operation"]
     if causes := getattr(report, "causes", []):
         said = " ".join(causes)
-        exact = stage and WRONG_PASS not in said
-        return Outcome(entry["id"], "explained" if exact or has_words(entry, said) else "wrong", stage, said)
+        exact = operation and WRONG_PASS not in said
+        return Outcome(entry["id"], "explained" if exact or has_words(entry, said) else "wrong", operation, said)
     first = next((s for s in report.suspects[:1] if s.named), None)
     named = f"{first.flag}: {first.title} ({first.wrong})" if first else ""
     said = named or " | ".join(line.strip() for line in lines)
-    return Outcome(entry["id"], kind_of(entry, named, lines, stage), stage, said)
+    return Outcome(entry["id"], kind_of(entry, named, lines, operation), operation, said)
 
 
-def kind_of(entry: dict, named: str, lines: list[str], stage: bool) -> str:
+def kind_of(entry: dict, named: str, lines: list[str], operation: bool) -> str:
     """The outcome of a report that refuses something: the name first, then what the diagnosis says."""
     if named:
         flag, of = named.partition(":")[0], entry["id"]
@@ -162,7 +162,7 @@ def kind_of(entry: dict, named: str, lines: list[str], stage: bool) -> str:
         return "told"
     if has_words(entry, " ".join(cases)):
         return "by case"
-    return "located" if stage and " alone" in lines[0] else "none"
+    return "located" if operation and " alone" in lines[0] else "none"
 
 
 def one(entry: dict, seconds: float = 0.0) -> Outcome:
@@ -183,7 +183,7 @@ def rates(outcomes: list[Outcome]) -> dict[str, list[float]]:
     kinds, of = Counter(o.outcome for o in outcomes), len(outcomes)
     counted = {
         "refused": of - kinds["passed"],
-        "right stage first": sum(o.stage for o in outcomes),
+        "right operation first": sum(o.operation for o in outcomes),
         "recognised": kinds["explained"] + kinds["named"] + kinds["told"],
         "recognised, or the case or the one wrong pass said": of - kinds["none"] - kinds["wrong"] - kinds["passed"],
         "wrongly named": kinds["wrong"],
@@ -194,10 +194,10 @@ def rates(outcomes: list[Outcome]) -> dict[str, list[float]]:
 def keep(name: str, outcomes: list[Outcome], seconds: float) -> None:
     """Write a run into the record, beside those of other names."""
     listed = {kind: [o.id for o in outcomes if o.outcome == kind] for kind in OUTCOMES}
-    late = [o.id for o in outcomes if not o.stage]
+    late = [o.id for o in outcomes if not o.operation]
     run = {"golden": GOLDEN.manifest.version, "seconds": round(seconds), "rates": rates(outcomes)}
     runs = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.is_file() else {}
-    write_json(RECORD, runs | {name: dated(run | {"outcomes": listed, "another stage first": late})})
+    write_json(RECORD, runs | {name: dated(run | {"outcomes": listed, "another operation first": late})})
 
 
 def main(words: list[str]) -> int:
@@ -221,8 +221,8 @@ def main(words: list[str]) -> int:
         for outcome in pool.imap(functools.partial(one, seconds=options.search), entries):
             outcomes.append(outcome)
             if options.said or outcome.outcome not in ("explained", "named", "told"):
-                stage = "" if outcome.stage else ", another stage first"
-                print(f"{outcome.id}: {outcome.outcome}{stage}\n    {outcome.said}", flush=True)
+                operation = "" if outcome.operation else ", another operation first"
+                print(f"{outcome.id}: {outcome.outcome}{operation}\n    {outcome.said}", flush=True)
     table = rates(outcomes)
     for name, (good, of, low, high) in table.items():
         print(f"{name}: {good} of {of}, {100 * good / of:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)")

@@ -1,4 +1,4 @@
-"""The independent mistakes: they fit their port, cover every stage, and a handful is recognised as the record says.
+"""The independent mistakes: they fit their port, cover every operation, and a handful is recognised as the record says.
 
 All of them: python tests/port/unseen/by_hand/measure.py --record now
 """
@@ -40,14 +40,14 @@ def test_the_port_by_hand_is_right():
     assert report.level == 3 and report.diagnosis == [] and report.suspects == []
 
 
-def test_every_mistake_fits_the_port_once_and_every_stage_has_some():
+def test_every_mistake_fits_the_port_once_and_every_operation_has_some():
     assert len(ENTRIES) == len(measure.mistakes()) >= 120
     for entry in ENTRIES.values():
         assert hand_port.sources(entry["edit"]) != hand_port.sources(), entry["id"]
         assert entry["text"].endswith(".") and entry["says"]
     later = {"registration"}  # (B19) is younger than the set, which is not added to
-    stages = set(hand_port.OPERATIONS) - {"reading", "generator"} - later
-    assert set(Counter(e["stage"] for e in ENTRIES.values())) == stages
+    operations = set(hand_port.OPERATIONS) - {"reading", "generator"} - later
+    assert set(Counter(e["operation"] for e in ENTRIES.values())) == operations
 
 
 def test_an_edit_that_does_not_stand_once_is_an_error():
@@ -66,8 +66,8 @@ def test_the_notes_beside_the_set_are_on_its_entries():
 def test_the_record_is_that_of_this_judge(name):
     found = measure.one(ENTRIES[name])
     kind = next(kind for kind, ids in LAST["outcomes"].items() if name in ids)
-    known = kind in RECOGNISED, name not in LAST["another stage first"]
-    assert (found.outcome in RECOGNISED, found.stage) == known, found.said
+    known = kind in RECOGNISED, name not in LAST["another operation first"]
+    assert (found.outcome in RECOGNISED, found.operation) == known, found.said
 
 
 def test_words_of_an_entry():

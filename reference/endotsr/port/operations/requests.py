@@ -16,7 +16,7 @@ from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.fast import blocks as compositing_blocks
 from endotsr.method.splatting.render import Compositor, Scene
 from endotsr.method.splatting.settings import LegacyDeviations, RasterSettings
-from endotsr.port.stages.stage import Inputs, Settings
+from endotsr.port.operations.operation import Inputs, Settings
 from endotsr.training.fitting.model import Spectral, spectral_from
 from endotsr.training.scene.gaussians import Gaussians
 from endotsr.untrusted.names import choice

@@ -1,4 +1,4 @@
-"""Stages of the Laplacian loss (5) and the calibration of its weight (7)."""
+"""Operations of the Laplacian loss (5) and the calibration of its weight (7)."""
 
 from functools import partial
 from typing import Any
@@ -10,7 +10,7 @@ from endotsr.errors import CalibrationError
 from endotsr.method.equations import calibration, laplacian
 from endotsr.method.equations.laplacian import SupportMasks, laplacian_levels, support_masks
 from endotsr.method.equations.pyramid import Upsampling
-from endotsr.port.stages.stage import Found, Inputs, Settings, Stage, Variant, split_blocks
+from endotsr.port.operations.operation import Found, Inputs, Operation, Settings, Variant, split_blocks
 
 LEVELS = 3
 IMAGE_SHAPE = (3, 19, 22)  # odd and even; sizes 19x22, 10x11, 5x6, 3x3
@@ -96,8 +96,8 @@ def _calibration(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found
     }, None
 
 
-STAGES = [
-    Stage(
+OPERATIONS = [
+    Operation(
         name="laplacian",
         equation="5",
         text="pyramid of the observed image, valid pixels, loss",
@@ -108,7 +108,7 @@ STAGES = [
         trace=_laplacian_trace,
         variants=(_variant("co_sited"), _variant("half_pixel")),
     ),
-    Stage(
+    Operation(
         name="calibration",
         equation="7",
         text="Laplacian weight from gradient images",

@@ -1,4 +1,4 @@
-"""A stage: a forward pass, its reverse pass, their results, and the inputs of its checks.
+"""An operation: a forward pass, its reverse pass, their results, and the inputs of its checks.
 
 Arrays and settings have the same names as in the golden cases. `d_NAME` is the derivative of the loss with respect to
 NAME: a cotangent if NAME is an output, a gradient if it is an input.
@@ -23,7 +23,7 @@ def _always(settings: Settings) -> bool:
 
 
 class Variant(NamedTuple):
-    """One gradient check of a stage: settings, and inputs that are non-vacuous and away from kinks.
+    """One gradient check of an operation: settings, and inputs that are non-vacuous and away from kinks.
 
     name      of the check, unique in the registry
     inputs    rng -> float64 arrays, all differentiable
@@ -32,7 +32,7 @@ class Variant(NamedTuple):
     blocks    inputs -> (input name, mask or index) by block name: separately probed parts;
               None = one block per input array
     covers    settings of a golden case -> whether this variant covers that case
-    function  dotted name of the forward function if it differs from the stage's
+    function  dotted name of the forward function if it differs from the operation's
     hard      inputs -> flat indices by input name: entries that are always probed individually
     single    "" = the variant is also compared in float32; otherwise the reason for its omission
     """
@@ -48,7 +48,7 @@ class Variant(NamedTuple):
     single: str = ""
 
 
-class Stage(NamedTuple):
+class Operation(NamedTuple):
     """One computation of the method.
 
     name      name of the operation in golden cases
@@ -63,7 +63,7 @@ class Stage(NamedTuple):
               signs); a finite difference across a change of them is rejected. None = no decisions
     variants  the gradient checks
     is_loss   the only output is the differentiated loss; its cotangent defaults to 1
-    plain     the pair wrapped by the stage, whose twin has the same names; None = written out
+    plain     the pair wrapped by the operation, whose twin has the same names; None = written out
     """
 
     name: str
@@ -123,10 +123,10 @@ class PlainPair(NamedTuple):
         found = self.reverse(_number(cotangents[self.output]), saved)
         return {self.gradient: found} if self.gradient else found._asdict()
 
-    def stage(self, name: str, equation: str, text: str, **fields: Any) -> Stage:
-        """The stage of this pair; `fields` as of `Stage`."""
+    def operation(self, name: str, equation: str, text: str, **fields: Any) -> Operation:
+        """The operation of this pair; `fields` as of `Operation`."""
         function = f"{self.forward.__module__}.{self.forward.__name__}"
-        return Stage(name, equation, text, function, self.run, self.back, plain=self, **fields)
+        return Operation(name, equation, text, function, self.run, self.back, plain=self, **fields)
 
 
 def _number(value: NDArray) -> Any:

@@ -1,4 +1,4 @@
-"""Stage of the correction of a camera pose (B16)."""
+"""Operation of the correction of a camera pose (B16)."""
 
 from functools import partial
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.method.equations import pose
-from endotsr.port.stages.stage import Found, Inputs, Settings, Stage, Variant
+from endotsr.port.operations.operation import Found, Inputs, Operation, Settings, Variant
 
 ALWAYS_DOUBLE = "a pose is computed in float64, whatever the precision of its inputs"
 
@@ -34,8 +34,8 @@ def _inputs(rng: np.random.Generator, angle: float) -> dict[str, NDArray]:
     }
 
 
-STAGES = [
-    Stage(
+OPERATIONS = [
+    Operation(
         name="pose",
         equation="B16",
         text="correction of a camera pose",

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.method.splatting.settings import PAPER
-from endotsr.port.stages.stage import Settings
+from endotsr.port.operations.operation import Settings
 
 WIDTH, HEIGHT = 21, 17
 COUNT = 8

@@ -1,4 +1,4 @@
-"""Stages of the Fourier components: frequencies and atoms (1), (1b), appearance (2), motion (3), Matern prior (4)."""
+"""Operations of the Fourier components: frequencies, atoms (1), (1b), appearance (2), motion (3), Matern prior (4)."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -11,7 +11,7 @@ from endotsr.method.equations import dictionary, matern
 from endotsr.method.equations.appearance import appearance_forward, appearance_reverse
 from endotsr.method.equations.dictionary import dictionary_forward, dictionary_reverse, frequencies
 from endotsr.method.equations.motion import motion_forward, motion_reverse
-from endotsr.port.stages.stage import Found, Inputs, PlainPair, Settings, Stage, Variant, split_blocks
+from endotsr.port.operations.operation import Found, Inputs, Operation, PlainPair, Settings, Variant, split_blocks
 
 Random = np.random.Generator
 
@@ -111,21 +111,21 @@ def _matern_inputs(rng: Random) -> dict[str, NDArray]:
     return {"motion_coefficients": scale * rng.normal(0.0, 1.0, (3, 2 * FREQUENCIES, GAUSSIANS))}
 
 
-STAGES = [
-    Stage(
+OPERATIONS = [
+    Operation(
         name="frequencies",
         equation="1",
         text="log-spaced frequencies",
         function="endotsr.method.equations.dictionary.frequencies",
         forward=partial(_frequencies, dictionary),
     ),
-    PlainPair(dictionary_forward, dictionary_reverse, "t omega", "phi").stage(
+    PlainPair(dictionary_forward, dictionary_reverse, "t omega", "phi").operation(
         "dictionary",
         "1",
         "atoms at one time, forward and reverse",
         variants=(Variant("dictionary", _dictionary_inputs),),
     ),
-    Stage(
+    Operation(
         name="atoms",
         equation="1b",
         text="statistics over the training stamps and normalised atoms",
@@ -135,7 +135,7 @@ STAGES = [
         extra=partial(_statistics, dictionary),
         variants=(Variant("normalise", _atoms_inputs, fixed=_stamps),),
     ),
-    PlainPair(appearance_forward, appearance_reverse, "appearance_coefficients phi_bar beta", "residual").stage(
+    PlainPair(appearance_forward, appearance_reverse, "appearance_coefficients phi_bar beta", "residual").operation(
         "appearance",
         "2",
         "bounded colour residual",
@@ -148,13 +148,13 @@ STAGES = [
             ),
         ),
     ),
-    PlainPair(motion_forward, motion_reverse, "motion_coefficients phi", "translation").stage(
+    PlainPair(motion_forward, motion_reverse, "motion_coefficients phi", "translation").operation(
         "motion",
         "3",
         "translation residual",
         variants=(Variant("motion", _motion_inputs, blocks=split_blocks(_each_atom("motion_coefficients"))),),
     ),
-    Stage(
+    Operation(
         name="matern",
         equation="4",
         text="Matern weights and penalty",

@@ -1,6 +1,6 @@
-"""The twin of every stage: the same inputs and outputs, computed by `endotsr.definition` in plain NumPy, in float64.
+"""The twin of every operation: the same inputs and outputs, by `endotsr.definition` in plain NumPy, in float64.
 
-`definition_stages` is used to compare every compiled function with its definition, to check the gradients of the
+`definition_operations` is used to compare every compiled function with its definition, to check the gradients of the
 definition, and to compare golden values with it.
 """
 
@@ -29,10 +29,18 @@ from endotsr.definition import (
     view,
 )
 from endotsr.definition import scene as moving
-from endotsr.port.stages.optimiser import CONSTANT_LENS, SERIES, squares_of
-from endotsr.port.stages.registry import all_stages
-from endotsr.port.stages.requests import Tape, camera_of, config_of, initialisation_of, model_of, raster_of, sequence_of
-from endotsr.port.stages.stage import Found, Inputs, Settings, Stage
+from endotsr.port.operations.operation import Found, Inputs, Operation, Settings
+from endotsr.port.operations.optimiser import CONSTANT_LENS, SERIES, squares_of
+from endotsr.port.operations.registry import method_operations
+from endotsr.port.operations.requests import (
+    Tape,
+    camera_of,
+    config_of,
+    initialisation_of,
+    model_of,
+    raster_of,
+    sequence_of,
+)
 from endotsr.training.fitting.model import raster_settings
 from endotsr.training.fitting.objective import full_weights
 
@@ -40,7 +48,7 @@ IMAGES = ("colour_image", "depth_image", "opacity_image")
 
 
 class Twin(NamedTuple):
-    """Functions that replace the functions of a stage."""
+    """Functions that replace the functions of an operation."""
 
     function: Any  # of the definition
     forward: Callable[[Inputs, Settings], tuple[Found, Any]]
@@ -48,18 +56,20 @@ class Twin(NamedTuple):
     extra: Callable[[Inputs, Settings, Any], Found] | None = None
 
 
-def definition_stages() -> dict[str, Stage]:
-    """Every stage computed by the definition, by name, with its functions instead of the compiled ones.
+def definition_operations() -> dict[str, Operation]:
+    """Every operation computed by the definition, by name, with its functions instead of the compiled ones.
 
-    Discrete decisions come from the compiled stage. Variants that differ only in the compiled function are omitted.
+    Discrete decisions come from the compiled operation. Variants that differ only in the compiled function are omitted.
     """
-    stages, made = all_stages(), {}
+    operations, made = method_operations(), {}
     for name, twin in twins().items():
-        stage, dotted = stages[name], f"{twin.function.__module__}.{twin.function.__name__}"
-        variants = tuple(variant for variant in stage.variants if not variant.settings.get("_compositor") == "blocks")
-        variants = variants or stage.variants
-        trace = None if stage.trace is None else _trace_of(stage)
-        made[name] = stage._replace(
+        operation, dotted = operations[name], f"{twin.function.__module__}.{twin.function.__name__}"
+        variants = tuple(
+            variant for variant in operation.variants if not variant.settings.get("_compositor") == "blocks"
+        )
+        variants = variants or operation.variants
+        trace = None if operation.trace is None else _trace_of(operation)
+        made[name] = operation._replace(
             function=dotted, forward=twin.forward, reverse=twin.reverse, extra=twin.extra, trace=trace,
             variants=tuple(variant._replace(function="") for variant in variants),
         )  # fmt: skip
@@ -67,36 +77,36 @@ def definition_stages() -> dict[str, Stage]:
 
 
 def twins() -> dict[str, Twin]:
-    """The twin of every stage computed by the definition."""
-    stages = all_stages()
-    return {n: twin_of(s) for n, s in stages.items() if n in TWINS or s.plain or isinstance(s.forward, partial)}
+    """The twin of every operation computed by the definition."""
+    operations = method_operations()
+    return {n: twin_of(s) for n, s in operations.items() if n in TWINS or s.plain or isinstance(s.forward, partial)}
 
 
-def twin_of(stage: Stage) -> Twin:
-    """The twin of a stage, with the module of the definition that has the name of the compiled module.
+def twin_of(operation: Operation) -> Twin:
+    """The twin of an operation, with the module of the definition that has the name of the compiled module.
 
-    Raises: KeyError for a stage without a module that is not in `TWINS`.
+    Raises: KeyError for an operation without a module that is not in `TWINS`.
     """
-    package, _, name = stage.function.rpartition(".")
-    if stage.name in TWINS:
-        return TWINS[stage.name]
+    package, _, name = operation.function.rpartition(".")
+    if operation.name in TWINS:
+        return TWINS[operation.name]
     module = importlib.import_module(f"endotsr.definition.{package.rpartition('.')[2]}")
-    if (pair := stage.plain) is not None:
+    if (pair := operation.plain) is not None:
         forward, reverse = (getattr(module, function.__name__) for function in (pair.forward, pair.reverse))
         own = pair._replace(forward=forward, reverse=reverse)
         return Twin(forward, own.run, own.back)
-    if not isinstance(stage.forward, partial):
-        raise KeyError(stage.name)
-    parts = (stage.forward, stage.reverse, stage.extra)
+    if not isinstance(operation.forward, partial):
+        raise KeyError(operation.name)
+    parts = (operation.forward, operation.reverse, operation.extra)
     bound = (partial(part.func, module) if isinstance(part, partial) else None for part in parts)
     return Twin(getattr(module, name), *bound)  # type: ignore[arg-type]
 
 
-def _trace_of(stage: Stage) -> Callable[[Inputs, Settings, Any], Any]:
-    """The decisions of the compiled stage at some inputs; ignores the saved tuple."""
-    trace = stage.trace
+def _trace_of(operation: Operation) -> Callable[[Inputs, Settings, Any], Any]:
+    """The decisions of the compiled operation at some inputs; ignores the saved tuple."""
+    trace = operation.trace
     assert trace is not None
-    return lambda inputs, settings, saved: trace(inputs, settings, stage.forward(inputs, settings)[1])
+    return lambda inputs, settings, saved: trace(inputs, settings, operation.forward(inputs, settings)[1])
 
 
 def _of(arrays: Inputs, names: tuple[str, ...]) -> list[Any]:

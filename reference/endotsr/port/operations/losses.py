@@ -1,4 +1,4 @@
-"""Stages of the losses on images. Gradient checks hold the observed frame, its mask and the prior fixed."""
+"""Operations of the losses on images. Gradient checks hold the observed frame, its mask and the prior fixed."""
 
 from functools import partial
 from typing import Any
@@ -10,7 +10,7 @@ from endotsr.method.losses import depth, masked_ssim
 from endotsr.method.losses.depth import depth_target
 from endotsr.method.losses.masked_l1 import MaskedL1Saved, masked_l1_forward, masked_l1_reverse
 from endotsr.method.losses.smoothness import SmoothnessSaved, smoothness_forward, smoothness_reverse
-from endotsr.port.stages.stage import Found, Inputs, PlainPair, Settings, Stage, Variant
+from endotsr.port.operations.operation import Found, Inputs, Operation, PlainPair, Settings, Variant
 
 Random = np.random.Generator
 
@@ -128,15 +128,15 @@ def _smoothness_inputs(rng: Random) -> dict[str, NDArray]:
     }
 
 
-STAGES = [
-    PlainPair(masked_l1_forward, masked_l1_reverse, "rendered observed mask", "loss", "d_rendered").stage(
+OPERATIONS = [
+    PlainPair(masked_l1_forward, masked_l1_reverse, "rendered observed mask", "loss", "d_rendered").operation(
         "masked_l1",
         "B6",
         "masked L1",
         trace=_l1_trace,
         variants=(Variant("masked_l1", _l1_inputs, fixed=_frame),),
     ),
-    Stage(
+    Operation(
         name="masked_ssim",
         equation="B7",
         text="masked SSIM",
@@ -145,7 +145,7 @@ STAGES = [
         reverse=partial(_ssim_reverse, masked_ssim),
         variants=(Variant("masked_ssim", _ssim_inputs, fixed=_frame),),
     ),
-    Stage(
+    Operation(
         name="normalised_depth",
         equation="B8",
         text="normalised depth",
@@ -157,7 +157,7 @@ STAGES = [
     ),
     PlainPair(
         smoothness_forward, smoothness_reverse, "rendered_depth rendered mask edges total_variation_factor", "loss"
-    ).stage(
+    ).operation(
         "smoothness",
         "B9",
         "smoothness with given edges",

@@ -1,10 +1,10 @@
-"""Stage of the exposure of one frame (B13)."""
+"""Operation of the exposure of one frame (B13)."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.method.equations.exposure import exposure_forward, exposure_reverse
-from endotsr.port.stages.stage import PlainPair, Variant
+from endotsr.port.operations.operation import PlainPair, Variant
 
 
 def _inputs(rng: np.random.Generator) -> dict[str, NDArray]:
@@ -16,8 +16,8 @@ def _inputs(rng: np.random.Generator) -> dict[str, NDArray]:
     }
 
 
-STAGES = [
-    PlainPair(exposure_forward, exposure_reverse, "colour log_gain bias", "exposed").stage(
+OPERATIONS = [
+    PlainPair(exposure_forward, exposure_reverse, "colour log_gain bias", "exposed").operation(
         "exposure", "B13", "gain and bias of a frame", variants=(Variant("exposure", _inputs),)
     )
 ]

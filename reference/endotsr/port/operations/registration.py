@@ -1,4 +1,4 @@
-"""Stage of the registration of two frames (B19)."""
+"""Operation of the registration of two frames (B19)."""
 
 from functools import partial
 from typing import Any
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from endotsr.method.splatting import registration
 from endotsr.method.splatting.camera import Camera
-from endotsr.port.stages.stage import Found, Inputs, Settings, Stage, Variant
+from endotsr.port.operations.operation import Found, Inputs, Operation, Settings, Variant
 
 ALWAYS_DOUBLE = "a residual is computed in float64, whatever the precision of its inputs"
 COUNT, WIDTH, HEIGHT = 9, 14, 11
@@ -60,8 +60,8 @@ def _picture(dtype: np.dtype) -> dict[str, NDArray]:
     return {"picture": np.random.default_rng(19).normal(0, 1, (HEIGHT, WIDTH)).astype(dtype)}
 
 
-STAGES = [
-    Stage(
+OPERATIONS = [
+    Operation(
         name="registration",
         equation="B19",
         text="residual of two frames registered by depth and a pose",

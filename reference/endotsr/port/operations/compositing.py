@@ -1,4 +1,4 @@
-"""Image stages: compositing of screen Gaussians (B5), and the whole render (B2) to (B5)."""
+"""Image operations: compositing of screen Gaussians (B5), and the whole render (B2) to (B5)."""
 
 from typing import Any, NamedTuple
 
@@ -22,9 +22,9 @@ from endotsr.method.splatting.records import (
 )
 from endotsr.method.splatting.render import CONIC_EPSILON, RenderSaved, Scene, render_forward, render_reverse
 from endotsr.method.splatting.settings import EXACT, RasterSettings
-from endotsr.port.stages.made_up import AXES, COUNT, HEIGHT, LENS, WIDE, WIDTH, is_near, pose, raw_gaussians
-from endotsr.port.stages.requests import camera_of, compositor_of, raster_dict, raster_of, scene_of
-from endotsr.port.stages.stage import Found, Inputs, Settings, Stage, Variant, split_blocks
+from endotsr.port.operations.made_up import AXES, COUNT, HEIGHT, LENS, WIDE, WIDTH, is_near, pose, raw_gaussians
+from endotsr.port.operations.operation import Found, Inputs, Operation, Settings, Variant, split_blocks
+from endotsr.port.operations.requests import camera_of, compositor_of, raster_dict, raster_of, scene_of
 
 Random = np.random.Generator
 IMAGES: tuple[str, ...] = ("colour_image", "depth_image", "opacity_image")
@@ -158,13 +158,13 @@ def _render_inputs(rng: Random) -> dict[str, NDArray]:
 HARMONICS = {f"harmonics degree {d}": slice(d * d, (d + 1) ** 2) for d in range(4)}
 
 
-def _variants(stage: str) -> tuple[Variant, ...]:
+def _variants(operation: str) -> tuple[Variant, ...]:
     """The definition with both presets, and the fast compositor if applicable."""
     made = []
     for name, raster in (("exact", EXACT), ("paper", WIDE), ("blocks", WIDE)):
         common = {"raster": raster_dict(raster), "_compositor": "blocks" if name == "blocks" else "definition"}
         covers = _blocks_answer if name == "blocks" else is_near(name)
-        if stage == "composite":
+        if operation == "composite":
             function = "endotsr.method.splatting.fast.blocks.composite_blocks_forward" if name == "blocks" else ""
             settings = common | {"width": WIDTH, "height": HEIGHT}
             made.append(Variant(f"composite_{name}", _composite_inputs, settings, covers=covers, function=function))
@@ -179,8 +179,8 @@ def _blocks_answer(settings: Settings) -> bool:
     return compositing_blocks.supports(raster_of(settings))
 
 
-STAGES = [
-    Stage(
+OPERATIONS = [
+    Operation(
         name="composite",
         equation="B5",
         text="blend screen Gaussians",
@@ -190,7 +190,7 @@ STAGES = [
         trace=_composite_trace,
         variants=_variants("composite"),
     ),
-    Stage(
+    Operation(
         name="render",
         equation="B5",
         text="one view of deformed Gaussians",

@@ -1,4 +1,4 @@
-"""The stage of the flexible deformation model (B1), with one variant per time basis."""
+"""The operation of the flexible deformation model (B1), with one variant per time basis."""
 
 from functools import partial
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.method.equations.deformation import CHANNELS, Basis, deformation_forward, deformation_reverse
-from endotsr.port.stages.stage import PlainPair, Variant
+from endotsr.port.operations.operation import PlainPair, Variant
 
 
 def _inputs(rng: np.random.Generator, spread: float) -> dict[str, NDArray]:
@@ -32,8 +32,8 @@ def _variant(basis: Basis, spread: float) -> Variant:
     )
 
 
-STAGES = [
-    PlainPair(deformation_forward, deformation_reverse, "fdm_weight fdm_centre fdm_width t basis", "offsets").stage(
+OPERATIONS = [
+    PlainPair(deformation_forward, deformation_reverse, "fdm_weight fdm_centre fdm_width t basis", "offsets").operation(
         "deformation",
         "B1",
         "offsets of the flexible deformation model",

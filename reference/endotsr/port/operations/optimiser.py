@@ -1,4 +1,4 @@
-"""Stages without a gradient: schedules (6), Adam (B10), density control (B11), initialisation (B12), training."""
+"""Operations without a gradient: schedules (6), Adam (B10), density control (B11), initialisation (B12), training."""
 
 from collections.abc import Iterable
 from functools import partial
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from endotsr.config import Config, DensityConfig
 from endotsr.method.splatting.camera import Camera
-from endotsr.port.stages.requests import Tape, config_of, gaussians_of, initialisation_of, model_of, sequence_of
-from endotsr.port.stages.stage import Found, Inputs, Settings, Stage, real_of
+from endotsr.port.operations.operation import Found, Inputs, Operation, Settings, real_of
+from endotsr.port.operations.requests import Tape, config_of, gaussians_of, initialisation_of, model_of, sequence_of
 from endotsr.training.fitting import schedules
 from endotsr.training.fitting.adam import AdamState, adam_state, adam_update, regather
 from endotsr.training.fitting.objective import calibrate_on
@@ -154,36 +154,36 @@ SQUARES = tuple(f"square_{name}" for name in Gaussians._fields)
 STATE = ("first_moments", "second_moments", "gradient_sum", "visits")
 SERIES = TERMS | {name: name for name in ("loss", *SQUARES, *STATE)}  # output: entry of the log
 
-STAGES = [
-    Stage(
+OPERATIONS = [
+    Operation(
         name="adam",
         equation="B10",
         text="optimiser steps with given gradients",
         function="endotsr.training.fitting.adam.adam_update",
         forward=_adam,
     ),
-    Stage(
+    Operation(
         name="schedule",
         equation="B10",
         text="rates, weights and switches of some iterations",
         function="endotsr.training.fitting.schedules.learning_rates",
         forward=partial(_schedule, schedules),
     ),
-    Stage(
+    Operation(
         name="density",
         equation="B11",
         text="statistics of some views, one densification",
         function="endotsr.training.scene.density_control.densify",
         forward=_density,
     ),
-    Stage(
+    Operation(
         name="initialisation",
         equation="B12",
         text="Gaussians from depth maps",
         function="endotsr.training.scene.initialisation.initialise",
         forward=_initialisation,
     ),
-    Stage(
+    Operation(
         name="training",
         equation="6",
         text="calibration and some iterations",

@@ -1,4 +1,4 @@
-"""Stages from raw Gaussians to the screen: covariance (B2), projection (B3), colour from harmonics (B4)."""
+"""Operations from raw Gaussians to the screen: covariance (B2), projection (B3), colour from harmonics (B4)."""
 
 from functools import partial
 from typing import Any
@@ -11,9 +11,9 @@ from endotsr.method.splatting.covariance import Shape, covariance_forward
 from endotsr.method.splatting.harmonics import HarmonicsSaved, harmonics_forward, harmonics_reverse
 from endotsr.method.splatting.projection import Projected, ProjectionSaved, projection_forward, projection_reverse
 from endotsr.method.splatting.settings import EXACT, PAPER, RasterSettings
-from endotsr.port.stages.made_up import AXES, COUNT, LENS, is_near, pose, positions
-from endotsr.port.stages.requests import camera_of, raster_dict, raster_of
-from endotsr.port.stages.stage import Found, Inputs, PlainPair, Settings, Stage, Variant, split_blocks
+from endotsr.port.operations.made_up import AXES, COUNT, LENS, is_near, pose, positions
+from endotsr.port.operations.operation import Found, Inputs, Operation, PlainPair, Settings, Variant, split_blocks
+from endotsr.port.operations.requests import camera_of, raster_dict, raster_of
 
 Random = np.random.Generator
 
@@ -112,8 +112,8 @@ def _harmonics_variant(degree: int) -> Variant:
     )
 
 
-STAGES = [
-    Stage(
+OPERATIONS = [
+    Operation(
         name="covariance",
         equation="B2",
         text="rotation and semi-axes",
@@ -122,7 +122,7 @@ STAGES = [
         reverse=partial(_covariance_reverse, covariance),
         variants=(Variant("covariance", _covariance_inputs),),
     ),
-    Stage(
+    Operation(
         name="projection",
         equation="B3",
         text="screen mean, covariance and depth",
@@ -132,7 +132,7 @@ STAGES = [
         extra=lambda inputs, settings, saved: {"visible": saved[0].visible},
         variants=(_projection_variant("exact", EXACT), _projection_variant("paper", PAPER)),
     ),
-    PlainPair(harmonics_forward, harmonics_reverse, "harmonics residual position centre degree", "colour").stage(
+    PlainPair(harmonics_forward, harmonics_reverse, "harmonics residual position centre degree", "colour").operation(
         "harmonics",
         "B4",
         "colour from harmonics",

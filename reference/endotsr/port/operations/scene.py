@@ -1,4 +1,4 @@
-"""Stages of the whole method: the moving scene, the objective (6) with every gradient, and its repetition."""
+"""Operations of the whole method: the moving scene, the objective (6) with every gradient, and its repetition."""
 
 import msgspec
 import numpy as np
@@ -7,11 +7,12 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv.filters import canny_edges
 from endotsr.clips.sequences.sequence import Frame
 from endotsr.config import Config, LossConfig, ModelConfig
-from endotsr.port.stages import laplacian, losses
-from endotsr.port.stages.compositing import render_decisions
-from endotsr.port.stages.laplacian import LEVELS
-from endotsr.port.stages.made_up import COUNT, HEIGHT, LENS, WIDE, WIDTH, pose, raw_gaussians
-from endotsr.port.stages.requests import (
+from endotsr.port.operations import laplacian, losses
+from endotsr.port.operations.compositing import render_decisions
+from endotsr.port.operations.laplacian import LEVELS
+from endotsr.port.operations.made_up import COUNT, HEIGHT, LENS, WIDE, WIDTH, pose, raw_gaussians
+from endotsr.port.operations.operation import Blocks, Found, Inputs, Operation, Settings, Variant, split_blocks
+from endotsr.port.operations.requests import (
     camera_of,
     compositor_of,
     gaussians_of,
@@ -20,7 +21,6 @@ from endotsr.port.stages.requests import (
     raster_of,
     spectral_of,
 )
-from endotsr.port.stages.stage import Blocks, Found, Inputs, Settings, Stage, Variant, split_blocks
 from endotsr.training.fitting.model import SceneSaved, scene_at
 from endotsr.training.fitting.objective import frame_targets, full_weights
 from endotsr.training.fitting.view import ViewGradients, view_gradients
@@ -79,15 +79,15 @@ def _images_and_terms(inputs: Inputs, settings: Settings, view: ViewGradients) -
 
 
 def _objective_trace(inputs: Inputs, settings: Settings, view: ViewGradients) -> dict[str, NDArray]:
-    """Decisions of the render, the edges, and what the stage of each loss decides at the rendered images."""
+    """Decisions of the render, the edges, and what the operation of each loss decides at the rendered images."""
     (colour, depth, _), fixed = view.rendered, {**settings["loss"], "levels": LEVELS}
     edges = canny_edges(depth)
     seen = {"rendered": colour, "rendered_depth": depth, "edges": edges, **inputs}
     found = render_decisions(view.render_saved) | {"edges": edges.astype(int)}
-    for stage in (*losses.STAGES, *laplacian.STAGES):
-        if stage.trace is not None:
-            decided = stage.trace(seen, fixed, stage.forward(seen, fixed)[1])
-            found |= {f"{stage.name} {name}": array for name, array in decided.items()}
+    for operation in (*losses.OPERATIONS, *laplacian.OPERATIONS):
+        if operation.trace is not None:
+            decided = operation.trace(seen, fixed, operation.forward(seen, fixed)[1])
+            found |= {f"{operation.name} {name}": array for name, array in decided.items()}
     return found
 
 
@@ -161,7 +161,7 @@ def _twice(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 TWICE = ("objective", "d_position", "d_harmonics")
 
-OBJECTIVE = Stage(
+OBJECTIVE = Operation(
     name="objective",
     equation="6",
     text="moving scene, render, full loss, every gradient",
@@ -174,8 +174,8 @@ OBJECTIVE = Stage(
     is_loss=True,
 )
 
-STAGES = [
-    Stage(
+OPERATIONS = [
+    Operation(
         name="scene",
         equation="2",
         text="raw parameters at time t, every component applied",
@@ -183,7 +183,7 @@ STAGES = [
         forward=_scene,
     ),
     OBJECTIVE,
-    Stage(
+    Operation(
         name="determinism",
         equation="6",
         text="the objective computed twice",
