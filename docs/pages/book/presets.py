@@ -30,6 +30,7 @@ MEASURED: Columns = (
     ("LPIPS [0,1]", "lpips", 1.0, 4),
 )  # head, key, unit, digits
 OF_RUN = ("peak_memory_bytes", "gaussians")
+TEXTURED = " with recorded texture"
 SIZES: Columns = (("GB", "peak_memory_bytes", 1e9, 1), ("Gaussians", "gaussians", 1.0, 0))
 
 
@@ -50,16 +51,23 @@ def of_seeds(clip: str, name: str) -> list[dict[str, Any]]:
     ]
 
 
+def textured(clip: str, name: str) -> list[dict[str, Any]]:
+    """Held-out means of every recorded seed of a preset with recorded texture; [] without such a row in the records."""
+    found = [metrics for key, metrics in record.stored(clip).items() if f"_{name}_seed" in key]
+    return [metrics["recorded_texture"]["mean"] for metrics in found if "recorded_texture" in metrics]
+
+
 def table(columns: Columns = MEASURED) -> str:
     """One row per preset, the fastest first, means over the seeds; predictions without a model; clip and machine."""
     found = loaded(RESULTS / "minutes.json")
     presets = {name: runs for name, runs in found["rows"].items() if name in PRESETS}
     timed = sorted((mean(run["seconds"] for run in runs), name) for name, runs in presets.items())
     seeds = {name: of_seeds("pulling", name) or runs for name, runs in presets.items()}
-    cells = [
-        [f"`{name}`", f"{seconds / 60:.1f}", *values(seeds[name], columns), str(len(seeds[name]))]
-        for seconds, name in timed
-    ]
+    cells = []
+    for seconds, name in timed:
+        cells.append([f"`{name}`", f"{seconds / 60:.1f}", *values(seeds[name], columns), str(len(seeds[name]))])
+        if of := textured("pulling", name):
+            cells.append([f"`{name}`{TEXTURED}", f"{seconds / 60:.1f}", *values(of, columns), str(len(of))])
     for name, values_of in minutes.baselines(found).items():
         cells.append([name, "-", *values([values_of], columns), "-"])
     runs = [run for of in presets.values() for run in of]
@@ -68,7 +76,8 @@ def table(columns: Columns = MEASURED) -> str:
     about = (
         f"{clip['name']}, {clip['frames']} frames of {clip['size']}, every eighth held out; means over the seeds. The "
         f"time is that of the iterations of one run with {' or '.join(map(str, threads))} threads of "
-        f"{', '.join(machines)}, {days(runs)}; another machine of this name took longer."
+        f"{', '.join(machines)}, {days(runs)}; another machine of this name took longer. *With recorded texture*: the "
+        "render, and what the two neighbouring training frames record and their renders lack; no excluded colour."
     )
     return noted(("Preset", "Training, minutes", *(head for head, *_ in columns), "Seeds"), cells, about)
 
@@ -111,7 +120,11 @@ def cutting() -> str:
         row for row in loaded(RESULTS / "ablation_cutting.json")["rows"] if row["configuration"] == "A+S+L"
     ]
     columns = (*SIZES, *MEASURED)
-    cells = [[f"`{name}`", *values(of, columns), str(len(of))] for name, of in rows.items()]
+    cells = []
+    for name, of in rows.items():
+        cells.append([f"`{name}`", *values(of, columns), str(len(of))])
+        if with_texture := textured("cutting", name):
+            cells.append([f"`{name}`{TEXTURED}", *values(with_texture, columns), str(len(with_texture))])
     first = next(iter(record.stored("cutting").values()))
     for key in (*PREDICTIONS[1:], *TISSUE_ONLY):
         cells.append([LABELS[key], *values([first["baselines"][key]["mean"]], columns), "-"])

@@ -2,7 +2,8 @@
 
     python docs/make.py full_size.record measure RUN NAME COMMIT   add or replace one record, then rewrite the tables
 
-COMMIT is the revision of this repository that made the run. The first part of NAME is `pulling` or `cutting`.
+COMMIT is the revision of this repository that made the run. The first part of NAME is `pulling` or `cutting`. A record
+with the same held-out metrics in every bit keeps its description of the run: it is the same model, with more rows.
 
 The tables stand in docs/results/README.md; README.md has the one of every eighth frame of pulling. The tables of
 cutting give in brackets the means without frames 73 and 74.
@@ -50,7 +51,11 @@ def record(options: argparse.Namespace) -> None:
     source["source"] = Path(source["source"]).name
     metrics["run"]["commit"] = options.commit
     metrics["published"] = [row for clip, row in PUBLISHED.items() if clip in source["source"]]
-    write_json(RESULTS / f"{options.name}.json", metrics)
+    file = RESULTS / f"{options.name}.json"
+    before = loaded(file) if file.is_file() else {}
+    if before.get("held_out") == metrics["held_out"]:
+        metrics["run"] = before["run"]
+    write_json(file, metrics)
 
 
 def split_of(metrics: dict) -> str:
