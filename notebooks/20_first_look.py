@@ -183,7 +183,8 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 #     if state.iteration == 0 or state.iteration % CHECK_EVERY:
 #         return False
 #     error = fit_error(state, coarse.constants, coarse.frames)
-#     state.coarse_until = expected_end(state.iteration, error, coarse)
+#     found = expected_end(state.iteration, error, coarse)
+#     state.coarse_until = (state.coarse_until + found) // 2 if state.coarse_until else found  # one check is a sample
 #     return error < coarse.lacking  # (20.5)
 # ```
 #
