@@ -40,7 +40,16 @@ CONSTANTS, INVENTORIES = "python docs/make.py ports.settings", "python docs/make
 OPERATIONS = "python docs/make.py ports.operations"
 RECORDED = tuple(  # of the records of single runs, which these programs find by the beginning of their names
     f"python docs/make.py {name}"
-    for name in ("full_size.record", "book.presets", "book.readme_gaps", "book.figures", "bench", "claims", "full_size")
+    for name in (
+        "full_size.record",
+        "book.presets",
+        "book.readme_gaps",
+        "book.texture",
+        "book.figures",
+        "bench",
+        "claims",
+        "full_size",
+    )
 )
 MAKERS = {
     f"{PACKAGE}config.py": ("python docs/make.py book.settings", CONSTANTS),

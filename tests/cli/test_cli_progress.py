@@ -267,7 +267,7 @@ def test_a_speed_that_was_timed_before_counts_while_the_second_thread_works():
 
 
 def test_full_frames_without_the_second_thread_tell_the_speed_more_than_anything_else():
-    """A coarse start was slower by a quarter than full frames in one run on a clip, and no slower in another one."""
+    """The coarse start of one run was slower by a quarter than that of another one on the same clip and machine."""
     course = Course(0.08)
     assert course.add(*[0.1] * MANY, coarse=True) == pytest.approx(mean(u80=2, u100=1))
     assert course.add(*[0.06] * LEAST_QUIET) == pytest.approx(mean(u80=2, u100=1, u60=1))

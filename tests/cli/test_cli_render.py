@@ -192,6 +192,11 @@ def test_texture_is_of_the_cameras_of_the_recording(words, finished_run, tmp_pat
     assert_refused(capsys, ["render", str(finished_run), "--out", str(tmp_path / "a"), "--texture", *words], *said)
 
 
+def test_texture_of_a_film_without_colour_is_refused(finished_run, tmp_path, capsys):
+    words = ["render", str(finished_run), "--film", str(tmp_path / "a.gif"), "--panels", "depth", "--texture"]
+    assert_refused(capsys, words, "--texture has no effect without", "no colour is written")
+
+
 def test_texture_needs_the_frames_of_a_run(finished_run, tmp_path, capsys):
     assert main(["export", str(finished_run), "--out", str(tmp_path / "slim.npz")]) == 0
     words = ["render", str(tmp_path / "slim.npz"), "--out", str(tmp_path / "a"), "--texture"]

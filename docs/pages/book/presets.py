@@ -15,7 +15,7 @@ from endotsr.config import PRESETS
 from endotsr.results.report.tables import duration, markdown
 from pages.bench import minutes
 from pages.bench.waiting_text import CLOCKS, processor
-from pages.book import running_clip
+from pages.book import running_clip, texture
 from pages.full_size import page as full_size
 from pages.full_size import record
 from pages.full_size.interpolation import TISSUE_ONLY
@@ -53,8 +53,7 @@ def of_seeds(clip: str, name: str) -> list[dict[str, Any]]:
 
 def textured(clip: str, name: str) -> list[dict[str, Any]]:
     """Held-out means of every recorded seed of a preset with recorded texture; [] without such a row in the records."""
-    found = [metrics for key, metrics in record.stored(clip).items() if f"_{name}_seed" in key]
-    return [metrics["recorded_texture"]["mean"] for metrics in found if "recorded_texture" in metrics]
+    return [run["recorded_texture"]["mean"] for run in texture.runs_of(clip, name)]
 
 
 def table(columns: Columns = MEASURED) -> str:
@@ -77,7 +76,8 @@ def table(columns: Columns = MEASURED) -> str:
         f"{clip['name']}, {clip['frames']} frames of {clip['size']}, every eighth held out; means over the seeds. The "
         f"time is that of the iterations of one run with {' or '.join(map(str, threads))} threads of "
         f"{', '.join(machines)}, {days(runs)}; another machine of this name took longer. *With recorded texture*: the "
-        "render, and what the two neighbouring training frames record and their renders lack; no excluded colour."
+        "render, and what the two neighbouring training frames record and their renders lack; the texture reads no "
+        "excluded colour."
     )
     return noted(("Preset", "Training, minutes", *(head for head, *_ in columns), "Seeds"), cells, about)
 

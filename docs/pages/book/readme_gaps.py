@@ -33,8 +33,8 @@ CLIP = "endonerf_pulling"
 
 
 def by_frame(runs: list[dict[str, Any]], of: str = "", metric: str = "psnr_tissue") -> Values:
-    """A metric of every held-out frame, mean over the runs: of the model, or of a baseline."""
-    rows = [(run["baselines"][of] if of else run["held_out"])["per_frame"] for run in runs]
+    """A metric of every held-out frame, mean over the runs: of the model, of a baseline, or of another part by key."""
+    rows = [(run["baselines"] | run)[of or "held_out"]["per_frame"] for run in runs]
     return np.array([[frame[metric] for frame in frames] for frames in rows]).mean(axis=0)
 
 
@@ -43,17 +43,26 @@ def runs_of(gap: int) -> list[dict[str, Any]]:
     return [loaded(file) for file in sorted(RESULTS.glob(GAPS[gap][0]))]
 
 
+def held_out_frames(runs: list[dict[str, Any]]) -> list[int]:
+    """The held-out frames of runs with one split."""
+    return [row["frame"] for row in runs[0]["held_out"]["per_frame"]]
+
+
 def frames_of(gap: int) -> list[int]:
     """The held-out frames."""
-    return [row["frame"] for row in runs_of(gap)[0]["held_out"]["per_frame"]]
+    return held_out_frames(runs_of(gap))
+
+
+def prediction(clip: str, split: str, name: str, metric: str, frames: list[int]) -> Values:
+    """A metric of a prediction without a model of the clip, on these held-out frames."""
+    part = loaded(RESULTS / ("network.json" if name == RIFE else "interpolation.json"))["clips"][clip][split]
+    assert part["frames"] == frames, f"{name}, {clip}, {split}: the records hold different frames"
+    return np.array(part["baselines"][name][metric])
 
 
 def predicted(gap: int, name: str, metric: str = "psnr_tissue") -> Values:
-    """A metric of a prediction without a model of the clip."""
-    record = loaded(RESULTS / ("network.json" if name == RIFE else "interpolation.json"))
-    part = record["clips"][CLIP][GAPS[gap][1]]
-    assert part["frames"] == frames_of(gap), f"{name}, {gap}: the records hold different frames"
-    return np.array(part["baselines"][name][metric])
+    """`prediction` for a length of the gap on pulling."""
+    return prediction(CLIP, GAPS[gap][1], name, metric, frames_of(gap))
 
 
 def difference(gap: int, name: str, metric: str = "psnr_tissue") -> Values:

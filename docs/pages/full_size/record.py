@@ -35,6 +35,9 @@ MORE = (
     "the seeds."
 )
 RANGE = "The paper does not state the input range of its LPIPS, so the published value stands in both columns."
+OF_RENDERS = {  # key of a prediction that is made of renders: its name, by preset
+    "recorded_texture": "`{}` with recorded texture", "cross_fade": "blend of the own renders of `{}`",
+}  # fmt: skip
 COLUMNS = (
     ("psnr_full", "PSNR full, dB", "{:.2f}"),
     ("psnr_tissue", "PSNR tissue, dB", "{:.2f}"),
@@ -90,18 +93,16 @@ def rows(records: dict[str, dict], without: tuple[int, ...] = ()) -> list[tuple[
     """
     first = next(iter(records.values()))
     presets: dict[str, list[dict]] = {}
-    faded: dict[str, list[dict]] = {}
-    textured: dict[str, list[dict]] = {}
+    own: dict[str, dict[str, list[dict]]] = {key: {} for key in OF_RENDERS}
     for metrics in records.values():
         preset = metrics["run"]["settings"]["preset"]
         presets.setdefault(preset, []).append(means(metrics["held_out"], without))
-        if row := metrics.get("recorded_texture"):
-            textured.setdefault(preset, []).append(means(row, without))
-        if row := metrics.get("cross_fade"):
-            faded.setdefault(preset, []).append(means(row, without))
+        for key, found in own.items():
+            if row := metrics.get(key):
+                found.setdefault(preset, []).append(means(row, without))
     out = [(f"endotsr, preset `{name}`{counted(runs)}", runs) for name, runs in presets.items()]
-    out += [(f"`{name}` with recorded texture{counted(of)}", of) for name, of in textured.items()]
-    out += [(f"blend of the own renders of `{name}`{counted(of)}", of) for name, of in faded.items()]
+    for key, found in own.items():
+        out += [(f"{OF_RENDERS[key].format(name)}{counted(of)}", of) for name, of in found.items()]
     out += [(baseline["label"], [means(baseline, without)]) for baseline in first["baselines"].values()]
     held_out = [row["frame"] for row in first["held_out"]["per_frame"]]
     kept = tissue_only(clip_of(first), split_of(first), without, held_out)  # records older than these lack them

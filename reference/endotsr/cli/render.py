@@ -85,7 +85,7 @@ def run(words: list[str]) -> int:
     use_threads(options.threads)
     scene = _opened(options)
     if options.texture:
-        check_texture(scene, request)
+        check_texture(scene)
     views = pictures.requested_views(scene, request, "test" if options.out else "all")
     shown_at, duration = [view.time for view in views], scene.record.duration
     rate = _rate(options, shown_at, duration)
@@ -93,7 +93,7 @@ def run(words: list[str]) -> int:
     sequence = shown_frames(scene, options.panels, views, options.sequence) if options.film else None
     made = pictures.rendered(scene, views, look)
     if options.texture:
-        made = with_texture(scene, made, options.sequence, options.without)
+        made = with_texture(scene, made, sequence, options.sequence, options.without)
 
     def film(shown) -> None:
         if options.film and rate:

@@ -25,7 +25,7 @@ AS_ELSEWHERE = {  # words of other programs -> options of this package that mean
     "invert invert-masks inverted": ("--excluded-value",),
     "workers num-workers num-threads jobs j": ("--threads",),
 }
-ELSEWHERE = {f"--{word}": meant for words, meant in AS_ELSEWHERE.items() for word in words.split()}
+ELSEWHERE = {word: meant for words, meant in AS_ELSEWHERE.items() for word in words.split()}
 SOURCE = "source source-path s input input-dir i data data-dir dataset video".split()
 DEVICE = "gpu gpus cuda device".split()
 OTHER_DASHES = "\N{EM DASH}\N{EN DASH}\N{MINUS SIGN}"  # that text programs make of hyphens
@@ -60,8 +60,9 @@ def _advice(option: str, fields: list[Field], names: list[str], command: str) ->
     if word in SOURCE and first is not None:
         return f"write {first.name} without an option: `endotsr {command} {first.name}`"
     if word in DEVICE:
-        return "the computation is on the CPU" + ("; --threads states how many" * ("--threads" in names))
-    offered = [name for name in ELSEWHERE.get(f"--{word}", ()) if name in names] or _similar(option, names)
+        more = "; --threads states how many" if "--threads" in names else ""
+        return f"the computation is on the CPU{more}"
+    offered = [name for name in ELSEWHERE.get(word, ()) if name in names] or _similar(option, names)
     return f"did you mean {' or '.join(offered)}?" if offered else f"`endotsr {command} --help` lists the options"
 
 

@@ -152,6 +152,9 @@ RENDER = (
     Needs(("depth",), ("out", "panels=depth"), "neither pictures of depth nor a panel of depth is written"),
     Needs(("angle",), ("camera=orbit", "camera=sway"), "the other cameras do not turn"),
     Needs(("sequence",), ("panels=truth", "panels=error", "texture"), "nothing else reads the frames of the sequence"),
+    Needs(("texture",), ("camera=observed",), "the frames show the views of the recording alone"),
+    Excludes(("texture",), ("offset", "size"), "the frames show the views of the recording alone (--camera observed)"),
+    Needs(("texture",), ("out", "panels=render", "panels=error"), "no colour is written"),
 )
 # format: of --out, by its ending
 EXPORT = (

@@ -163,18 +163,22 @@ def _aligned(clip: Clip, relative: Callable[[int], FloatArray], source: Path, al
 
 def _of_wrong_depth(clip: Clip) -> str:
     """The end of a message where the light contradicts the depth that the clip has, with what removes it."""
-    known, light = clip.depth, []
-    assert known is not None
-    looked = list(range(min(LOOKED_AT, clip.count)))
-    for i, pair in zip(looked, clip.pictures(looked)):
-        if (depth := known(i)) is not None:
-            light.append(light_correlation(pair.left, depth, clip.masks(i) if clip.masks else None))
-    if not (found := light_finding(light, str(clip.where))):
+    assert clip.depth is not None
+    if not (found := light_finding(_light(clip, clip.depth), str(clip.where))):
         return ""
     return (
         f"; but {found[0].what}: the depth of {clip.where.name} may be the wrong one: prepare the clip again without"
         " depth, and repeat the command"
     )
+
+
+def _light(clip: Clip, depth: Callable[[int], FloatArray | None]) -> list[float]:
+    """`light_correlation` of the first `LOOKED_AT` frames that have a depth."""
+    looked, found = list(range(min(LOOKED_AT, clip.count))), []
+    for i, pair in zip(looked, clip.pictures(looked)):
+        if (plane := depth(i)) is not None:
+            found.append(light_correlation(pair.left, plane, clip.masks(i) if clip.masks else None))
+    return found
 
 
 def _sampled(relative: FloatArray, depth: NDArray[np.float32] | None, most: int) -> FloatArray:
@@ -221,12 +225,7 @@ def _assumed_line(
 def _refuse_against_light(
     clip: Clip, relative: Callable[[int], FloatArray], lines: list[StraightLine], source: Path
 ) -> None:
-    light = []
-    looked = list(range(min(LOOKED_AT, clip.count)))
-    for i, pair in zip(looked, clip.pictures(looked)):
-        tissue = clip.masks(i) if clip.masks else None
-        light.append(light_correlation(pair.left, lines[i].depth(relative(i)), tissue))
-    if light_finding(light, str(source)):
+    if light_finding(_light(clip, lambda i: lines[i].depth(relative(i))), str(source)):
         raise InputError(
             f"{source}: the values are large where the pictures are dark, but near tissue is bright; use a"
             " relative inverse depth, larger = nearer, or --trust-depth for a light source off the scope"

@@ -7,24 +7,20 @@ With the render R at a time, and the renders R_k of the model at the training ti
 
 where c_k are the weights of the two neighbours (metrics, *Baselines*), and v_k(x) is 1 where the four pixels of the
 bilinear kernel at x + w_k(x) are tissue of frame k, else 0. Where no v_k is 1, J = R. The flow is computed between
-renders: there is one at the wanted time, and they show no instrument that the masks exclude. No excluded colour is read
-here; whether the training read one depends on its preset.
+renders: there is one at the wanted time, and no loss fits them to an instrument that the masks exclude. No excluded
+colour is read here; whether the training read one depends on its preset.
 
 In: a sequence, and the renders of a model as a function of the frame number. Out: the picture J. Specification:
 metrics, *Recorded texture*.
 """
-
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import FloatArray
-from endotsr.results.evaluation.baselines import Neighbours, neighbours, unit_image
+from endotsr.results.evaluation.baselines import Neighbours, RenderFrame, neighbours, unit_image
 from endotsr.results.evaluation.tissue_baselines import WHOLE
-
-RenderFrame = Callable[[int], FloatArray]
 
 
 def with_recorded_texture(sequence: Sequence, index: int, render: RenderFrame) -> FloatArray:

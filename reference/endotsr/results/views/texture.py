@@ -13,38 +13,36 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation.recorded_texture import around, textured
 from endotsr.results.export.scene import MovingScene
-from endotsr.results.views.plan import PlannedView, ViewRequest
+from endotsr.results.views.pictures import ReadFrames
+from endotsr.results.views.plan import PlannedView
 from endotsr.training.runs.sources import load_run_sequence
 
 KEPT = 4  # cached renders of training frames
 
 
-def check_texture(scene: MovingScene, request: ViewRequest) -> None:
-    """Raises InputError for a scene without frames, or for another camera than that of the frames."""
+def check_texture(scene: MovingScene) -> None:
+    """Raises InputError for a scene without the frames of one training."""
     if scene.folder is None:
         raise InputError("render: --texture needs the frames of one training; use a run folder without windows")
-    if request.camera != "observed" or any(request.offset) or request.size:
-        raise InputError(
-            "render: --texture: the frames show the views of the recording alone; use --camera observed, without"
-            " --offset and --size"
-        )
 
 
 def with_texture(
     scene: MovingScene,
     views: Iterator[tuple[PlannedView, RenderOut]],
+    known: ReadFrames | None = None,
     source: str | None = None,
     taken_out: tuple[str, ...] = (),
 ) -> Iterator[tuple[PlannedView, RenderOut]]:
-    """The views with recorded texture in their colour (3, H, W), in [0, 1].
+    """The views, from cameras of the recording, with recorded texture in their colour (3, H, W), in [0, 1].
 
-    source      current location of the sequence; default: the recorded one
+    known       the frames of the run, if they were read
+    source      its current location; default: the recorded one
     taken_out   spectral components that the renders lack
 
     Raises:  InputError if the sequence is missing, or is not that of the run
     """
     assert scene.folder is not None
-    sequence: Sequence = load_run_sequence(scene.folder, source)
+    sequence = known if isinstance(known, Sequence) else load_run_sequence(scene.folder, source)
 
     @lru_cache(KEPT)
     def own(index: int) -> FloatArray:

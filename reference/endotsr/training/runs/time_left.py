@@ -24,8 +24,9 @@ SPIKE = 4.0  # medians; longer iterations are left out, such as those that compi
 # with full frames and 0.52 to 0.63 with half ones, four runs of `quick` on pulling. A guess at the cause: of three
 # threads on two cores, a parallel loop waits for the one that shares a core.
 SLOWED = 1.6
-# Weights of known speeds: timed before, beside the second thread, in a coarse start. Of six choices that were tried on
-# one run each of `quick` on two recorded clips and a simulated one, these had the smallest rises of the time left.
+# Weights of known speeds: timed before, beside the second thread, in a coarse start. On one run each of `quick` on two
+# recorded clips and a simulated one, the largest rise of the time left was 9 % with these weights, 10 % with equal ones
+# and 8 or 9 % with five other choices, some of them with another SLOWED or LEAST_QUIET.
 BEFORE, BESIDE, COARSE = 2.0, 0.5, 1.0
 LEAST_QUIET = 8  # iterations without the second thread; that many full ones have the weight 1
 PATIENCE = 30.0  # seconds for which these are awaited on a machine without a speed; the time left is unknown until then
@@ -81,8 +82,8 @@ class TimeLeft:
         """Seconds per unit of work, as the geometric mean of several speeds; None = too few iterations up to now.
 
         These are the speed that was timed before, that of the iterations beside the second thread, that of a coarse
-        start without it, and that of full frames without it. Each of the first three was wrong by up to a quarter in
-        some run, in either direction; the weight of the last one grows with the number of its iterations.
+        start without it, and that of full frames without it. The second was wrong by a fifth in one run, and the third
+        differed by a quarter between two runs on a clip; the weight of the last one grows with its iterations.
         """
         before, near = self._plan.unit, near_targets(self._timed) if self._plan.threads > 1 else set()
         beside = [one for k, one in enumerate(self._timed) if k in near]
